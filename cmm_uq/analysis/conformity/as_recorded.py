@@ -215,8 +215,10 @@ def _gaps(points: Points, repeats: int | None) -> Iterator[Message]:
             if absent := sorted(usual - own[repeat]):
                 yield say(
                     "point {which} of measurement {measurement}, repeat {repeat}: recorded in its other repeats alone",
-                    which=_which(absent), measurement=m, repeat=repeat,
-                )  # fmt: skip
+                    which=_which(absent),
+                    measurement=m,
+                    repeat=repeat,
+                )
 
 
 def _absent(numbers: Collection[int]) -> list[int]:
@@ -304,7 +306,6 @@ class Supplemented(Around):
 
 
 def supplemented(artefact: Artefact, gauge: ShortGauge | None) -> Artefact:
-    """The artefact with a short gauge beside it, where one was recorded."""
     return artefact if gauge is None else Supplemented(artefact, gauge)
 
 
@@ -336,9 +337,11 @@ def added_in_words(gauge: ShortGauge | None, found: Indications) -> Text:
         "To {count} of {all} errors of lengths that are not bidirectional by themselves that of the short gauge, "
         "{length} mm, U = {U} µm (k = 2), in the same place and direction is added, repeat by repeat, by a procedure of this "
         "program: the text of the standard was not at hand.",
-        count=int(np.count_nonzero(found.u_beside)), all=len(found.errors), length=nominal(gauge.facts.length_mm),
+        count=int(np.count_nonzero(found.u_beside)),
+        all=len(found.errors),
+        length=nominal(gauge.facts.length_mm),
         U=significant(2 * gauge.facts.u_um),
-    )  # fmt: skip
+    )
 
 
 def _tips(points: Points) -> Floats:

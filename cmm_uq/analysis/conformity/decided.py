@@ -34,7 +34,6 @@ Chosen = Callable[[Artefact, Indications], NDArray[np.bool_]]  # which lengths o
 
 
 def at_offset(offset_mm: float) -> Chosen:
-    """Lengths measured with the stylus tip so far across the ram."""
     return lambda artefact, found: with_offset(artefact.points, found.rows, offset_mm)
 
 
@@ -69,18 +68,19 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Rem
     """Every error of indication against its own maximum permissible error."""
     found, under, points = test.indications(), test.circumstances, test.artefact.points
     rows, others = _of_this_test(test, found, chosen)
-    first, position, aside = found.rows[:, 0], lines(test.artefact, found), test.set_aside(found.rows)
-    errors, limits = found.errors / MICROMETRE, test.limits_um(found.lengths)
+    first, position, aside = found.rows[rows, 0], lines(test.artefact, found), test.set_aside(found.rows)
     causes = causes_of_lengths(found, test.artefact, under).at_least(test.least_u(found.lengths))
     test.refuse_without_uncertainty(float(causes.u[rows].min()), "u_um")
-    items = tuple(
-        test.decided(
-            float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True,
-            measurement=int(points.measurement[first[i]]), repeat=int(points.repeat[first[i]]),
-            length_mm=float(found.lengths[i]), position=position[i], set_aside=bool(aside[i]),
-        )
-        for i in rows
-    )  # fmt: skip
+    items = test.each_decided(
+        found.errors[rows] / MICROMETRE,
+        causes.u[rows],
+        found.lengths[rows],
+        signed=True,
+        set_aside=aside[rows],
+        measurement=points.measurement[first].tolist(),
+        repeat=points.repeat[first].tolist(),
+        position=[position[i] for i in rows],
+    )
     if again is not None:
         items = with_standing(items, nominals(found.lengths)[rows], again)
     worst = least_favourable(items)
@@ -95,10 +95,12 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Rem
             say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
         )
     budget = length_budget(
-        float(found.lengths[named]), float(found.u[named]),
-        REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]), under,
+        float(found.lengths[named]),
+        float(found.u[named]),
+        REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]),
+        under,
         0.0 if found.u_beside is None else float(found.u_beside[named]),
-    )  # fmt: skip
+    )
     quantity, repeats = say("error of indication of length, worst against its limit"), again.repeats if again else None
     return test.stated(quantity, say("lengths"), items, remarks, causes=causes.of(rows), budget=budget, repeats=repeats)
 
@@ -143,10 +145,13 @@ def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> tupl
     own = ~copied & (True if chosen is None else chosen(test.artefact, found))
     test.refuse_nothing_measured(bool(own.any()), "lengths of its own positions, tips and sizes")
     count = int((~copied & ~own).sum())
-    one = say("{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
-              count=count)  # fmt: skip
-    many = say("{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
-               count=count)  # fmt: skip
+    one = say(
+        "{count} length recorded beside them has another position, stylus tip or size, and is not decided.", count=count
+    )
+    many = say(
+        "{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
+        count=count,
+    )
     return np.flatnonzero(own), [plural(count, one=one, many=many)] if count else []
 
 
@@ -159,7 +164,9 @@ def _in_words(items: Sequence[Decided], worst: Decided, stated: TestUncertainty)
     elif u > 0:
         uncertain = say(
             "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um:.3g} µm for "
-            "the length named; nothing else is stated.", u_um=u)  # fmt: skip
+            "the length named; nothing else is stated.",
+            u_um=u,
+        )
     least = say(
         "least favourable: measurement {measurement}, repeat {repeat}, {length} mm",
         measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=nominal(worst.length_mm or 0.0),
@@ -186,7 +193,6 @@ def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> It
 
 
 def volumetric_performance(test: Test) -> Statement:
-    """Range of the ballbar's lengths (5.5.2)."""
     artefact, measured = test.artefact, test.accuracy["b89_range_um"]
     bar = artefact.sizes[0].nominal
     budget, remark = _bar_budget(test)
@@ -215,7 +221,9 @@ def _bar_budget(test: Test) -> tuple[Budget, Text]:
         return budget, say(
             "u is the test uncertainty: what of the bar changed between its positions, {u:.3g} µm. "
             "What its certificate leaves uncertain is common to all and cancels; the machine's own scatter is part of what "
-            "is tested.", u=budget.u)  # fmt: skip
+            "is tested.",
+            u=budget.u,
+        )
     if test.answered:
         return budget, NOT_STATED
     if size.certified and size.sd > 0:
@@ -225,7 +233,9 @@ def _bar_budget(test: Test) -> tuple[Budget, Text]:
         return bound, say(
             "u is a bound of the test uncertainty, {u:.3g} µm: it is not stated what of the bar changed between its "
             "positions, and it is taken to be no more than its certificate leaves uncertain. The machine's own scatter is "
-            "part of what is tested.", u=bound.u)  # fmt: skip
+            "part of what is tested.",
+            u=bound.u,
+        )
     return budget, say(
         "Nothing is stated of what the bar leaves uncertain: in its place u is the machine's own "
         "scatter, by which the range would differ if the test were made again."
@@ -253,7 +263,6 @@ def offset_probe(test: Test) -> Statement:
 
 
 def offset_positions(positions: Collection[Text], artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    """Which positions were measured with tips to both sides."""
     measured = {position for position, _, _ in _differences(artefact)}
     lacking = dict.fromkeys(position for position in positions if position not in measured)
     missing = tuple(say("{position} with the stylus tip to both sides", position=position) for position in lacking)
@@ -330,11 +339,12 @@ def _of_spheres(
     """Every sphere (q,) decided on its value, mm, all with one u, µm, which they share."""
     size = test.artefact.sizes[0].nominal
     u = test.at_least(u, size)
-    runs = [(i, int(probed.measurement[i]), int(probed.repeat[i])) for i in np.flatnonzero(_originals(test, probed))]
-    items = tuple(
-        test.decided(float(values[i] / MICROMETRE), u, test.limit_um(size), signed=signed, measurement=measurement,
-                     repeat=repeat, length_mm=size, set_aside=test.set_aside_in(measurement, repeat))
-        for i, measurement, repeat in runs
+    own = np.flatnonzero(_originals(test, probed))
+    runs = list(zip(probed.measurement[own].tolist(), probed.repeat[own].tolist(), strict=True))
+    items = test.each_decided(
+        values[own] / MICROMETRE, np.full(len(own), u), np.full(len(own), size), signed=signed,
+        measurement=[m for m, _ in runs], repeat=[r for _, r in runs],
+        set_aside=np.array([test.set_aside_in(*run) for run in runs], dtype=bool),
     )  # fmt: skip
     remarks, count, largest = [remark], len(items), least_favourable(items).measurement or 0
     if count > 1:
@@ -363,7 +373,6 @@ def range_of_centres(test: Test) -> Statement:
 
 
 def repeats_of_sphere(repeats: int, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    """How often each sphere was probed in its place."""
     what, points = say("{repeats} repeats of the fixed ball", repeats=repeats), artefact.points
     if artefact.forms() is None:
         return (Condition(what, (what,)),)

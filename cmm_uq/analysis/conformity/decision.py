@@ -26,8 +26,6 @@ _REACH = 9.0  # Standard deviations beyond which a normal distribution is nothin
 
 @dataclass(frozen=True)
 class PriorKnowledge:
-    """A quantity before it is measured."""
-
     mean: float  # mean, sd: of the normal distribution
     sd: float
 
@@ -54,8 +52,6 @@ class PriorKnowledge:
 
 @dataclass(frozen=True)
 class Risks:
-    """Of all items that are tested alike."""
-
     consumer: float  # that an item does not conform and is accepted
     producer: float  # that an item conforms and is not accepted
 
@@ -103,8 +99,6 @@ UNCONDITIONAL = 0.02  # Largest share of wrongly accepted items (ANSI/NCSL Z540.
 
 @dataclass(frozen=True)
 class Decision:
-    """What follows from a value and a limit under a rule."""
-
     outcome: Outcome  # undecided when neither conformity nor nonconformity is proved
     probability_conforming: float | None  # that the quantity is within its limits; None without an uncertainty
     probability_beyond: float | None  # the rest of it, kept apart since 1 − P loses what is small

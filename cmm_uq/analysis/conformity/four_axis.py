@@ -31,33 +31,20 @@ _TITLES = {
 
 
 def four_axis_error(test: Test, figure: str) -> Statement:
-    """The range of each sphere against the limit."""
     points = test.artefact.points
     figures = test.artefact.figures(np.ones(len(points), dtype=bool))
     test.refuse_nothing_measured(figure in figures, "spheres at several positions of the table")
-    items, found = [], figures[figure]
-    for value, rows, radius, name in zip(
-        found.values, found.rows, np.round(found.lengths, 2).tolist(), found.names, strict=True
-    ):
-        u = u_of_repeats(radius, test.circumstances)
-        test.refuse_without_uncertainty(u, "u_repeat_um")
-        measurement = int(points.measurement[rows[0]])
-        items.append(
-            test.decided(
-                float(value) / MICROMETRE,
-                test.at_least(u, radius),
-                test.limit_um(radius),
-                signed=False,
-                measurement=measurement,
-                length_mm=radius,
-                position=name,
-                set_aside=bool(test.set_aside(rows[None]).any()),
-            )
-        )
-    remarks = [
-        say("u is what of spheres and fixture changed between the positions.") if items[0].u_um > 0 else NOT_STATED
-    ]
-    return test.stated(_TITLES[figure], say("spheres"), tuple(items), remarks, signed=False)
+    found = figures[figure]
+    radii = np.round(found.lengths, 2)
+    u = np.array([u_of_repeats(radius, test.circumstances) for radius in radii.tolist()])
+    test.refuse_without_uncertainty(float(u.min()), "u_repeat_um")
+    items = test.each_decided(
+        np.asarray(found.values) / MICROMETRE, np.where(u > 0, np.maximum(u, test.least_u(radii)), u), radii, signed=False,
+        measurement=[int(points.measurement[rows[0]]) for rows in found.rows], position=found.names,
+        set_aside=np.array([test.set_aside(rows[None]).any() for rows in found.rows], dtype=bool),
+    )  # fmt: skip
+    how = say("u is what of spheres and fixture changed between the positions.") if items[0].u_um > 0 else NOT_STATED
+    return test.stated(_TITLES[figure], say("spheres"), items, [how], signed=False)
 
 
 def conditions(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
@@ -92,12 +79,8 @@ def _lacking(points: Points, machine: Turntable, number: int, *, recorded: bool)
         if min(senses) < POSITIONS or np.ptp(read) < far - _SAME or abs(read[0] - read[-1]) > _SAME:
             yield say(
                 "measurement {number}, sphere {name}: {out} positions out and {back} back over {turn:g}°",
-                number=number,
-                name=Verbatim(name),
-                out=senses[0],
-                back=senses[1],
-                turn=float(np.ptp(read)),
-            )
+                number=number, name=Verbatim(name), out=senses[0], back=senses[1], turn=float(np.ptp(read)),
+            )  # fmt: skip
         if recorded and len(np.unique(sphere.xyz, axis=0)) < len(sphere):
             yield say("measurement {number}: centres that repeat another to the last digit", number=number)
     low, high = (sphere.xyz.mean(axis=0) - machine.pivot for sphere in spheres)
@@ -120,47 +103,40 @@ CHARACTERISTICS = tuple(
 NAME = "ISO 10360-3:2000"
 CLAUSES = (
     Clause(
-        "scope",
-        say("scope"),
+        "scope", say("scope"),
         "Machines with three axes for coordinates and a rotary table that orients the workpiece.",
-        "its publisher's abstract",
-        True,
+        "its publisher's abstract", True,
     ),
     Clause(
-        "errors",
-        say("four-axis errors"),
+        "errors", say("four-axis errors"),
         "Range of the coordinates of each sphere's centre on the table over all "
         "positions, along the radius (FR), the tangent (FT) and the axis (FA); spheres A and B each by itself.",
         "names and directions: a manufacturer's summary; that they are ranges of each sphere: as commonly reported",
     ),
     Clause(
-        "directions",
-        say("directions"),
+        "directions", say("directions"),
         "Radius from the stated axis through the mean of the sphere. A coordinate system "
         "made of the spheres themselves, as the standard may ask, is not made: it is moved and turned by no more than the "
         "errors themselves, which changes a range by their square over the radius.",
         CHOSEN,
     ),
     Clause(
-        "spheres",
-        say("where the spheres stand"),
+        "spheres", say("where the spheres stand"),
         "A low and B high, at one radius (within 10 %) on opposite sides (within "
         "30°). Radius and height difference are stated with the result; those for which the limits hold, and the load, are "
         "for the procedure to state.",
         CHOSEN,
     ),
     Clause(
-        "positions",
-        say("positions of the table"),
+        "positions", say("positions of the table"),
         "At 0, at seven more in one sense over 720° or all of the travel, and at seven back to the start.",
         "seven, out and back: as commonly reported, not verified; 720°: this project, the stricter reading",
     ),
     Clause("again", say("measuring again"), "Nothing is measured again.", CHOSEN),
     Clause(
-        "test_uncertainty",
-        say("test uncertainty"),
+        "test_uncertainty", say("test uncertainty"),
         "What of spheres and fixture changes between the positions; form of the spheres where it does not repeat.",
         CHOSEN,
     ),
     ITS_RULE,
-)
+)  # fmt: skip

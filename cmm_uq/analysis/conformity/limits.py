@@ -30,8 +30,6 @@ _GRID, _HALVINGS, _NODES, _REACH = 33, 30, 2000, 8.0
 
 @dataclass(frozen=True)
 class LimitDecision:
-    """What follows from a value between limits."""
-
     lower: float | None
     upper: float | None
     outcome: Outcome | None  # None where nothing was measured

@@ -28,7 +28,7 @@ from cmm_uq.analysis.conformity.uncertainty import (
     temperatures,
     u_of_repeats,
 )
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
+from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
@@ -43,55 +43,43 @@ FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
     "error": (say("error of length, worst against its limit"), say("lengths"), LENGTH_LINES),
     "mean error": (say("mean error of all lengths"), say("means"), LENGTH_LINES),
     "standard deviation of errors": (
-        say("standard deviation (n − 1) of the errors of all lengths"),
-        say("standard deviations"),
-        LENGTH_LINES,
+        say("standard deviation (n − 1) of the errors of all lengths"), say("standard deviations"), LENGTH_LINES,
     ),
     "angle error": (
-        say("error of an angle, as an arc over the shorter of its sides, worst against its limit"),
-        say("angles"),
+        say("error of an angle, as an arc over the shorter of its sides, worst against its limit"), say("angles"),
         LENGTH_LINES,
     ),
     "repeatability": (say("range of repeats in one place, worst against its limit"), say("ranges"), REPEAT_LINES),
     "span": (say("span of the radii about the best centre"), say("spans"), REPEAT_LINES),
     "standard deviation": (
-        say("standard deviation of the radii about their mean and the best centre"),
-        say("standard deviations"),
+        say("standard deviation of the radii about their mean and the best centre"), say("standard deviations"),
         REPEAT_LINES,
     ),
     "span corrected": (
-        say("span of the radii that would remain with three scales and three squarenesses corrected"),
-        say("spans"),
+        say("span of the radii that would remain with three scales and three squarenesses corrected"), say("spans"),
         REPEAT_LINES,
     ),
     "standard deviation corrected": (
         say("standard deviation of the radii that would remain with three scales and three squarenesses corrected"),
-        say("standard deviations"),
-        REPEAT_LINES,
+        say("standard deviations"), REPEAT_LINES,
     ),
     "pivot offset": (
         say("distance of the centre that is best without corrections from that which is best with them"),
-        say("distances"),
-        REPEAT_LINES,
+        say("distances"), REPEAT_LINES,
     ),
     "flatness": (say("flatness, worst against its limit"), say("planes"), FORM_LINES),
     "closure": (
         say("distance of the sphere's centre in one attitude from that of all, worst against its limit"),
-        say("distances"),
-        REPEAT_LINES,
+        say("distances"), REPEAT_LINES,
     ),
     "linearity": (say("linearity error of the axis, peak to valley"), say("curves"), EVALUATED),
     "straightness": (
-        say("straightness of a motion, peak to valley, worst against its limit"),
-        say("curves"),
-        EVALUATED,
+        say("straightness of a motion, peak to valley, worst against its limit"), say("curves"), EVALUATED,
     ),
     "squareness": (
-        say("squareness of two axes, as an arc over the shorter of their travels"),
-        say("angles"),
-        EVALUATED,
+        say("squareness of two axes, as an arc over the shorter of their travels"), say("angles"), EVALUATED,
     ),
-}
+}  # fmt: skip
 ANGLES = ("angle error", "squareness")
 SIGNED = ("error", "mean error", *ANGLES)
 _UNSTATED = {EVALUATED: "u_coordinate_um", LENGTH_LINES: "u_um", REPEAT_LINES: "u_repeat_um", FORM_LINES: "form_um"}
@@ -118,20 +106,12 @@ def decided(test: Test, *, name: str) -> Statement:
     points, aside = test.artefact.points, test.set_aside(found.rows)
     of, repeats = points.measurement[found.rows], points.repeat[found.rows]
     one, same = (np.all(values == values[:, :1], axis=1) for values in (of, repeats))
-    items = tuple(
-        test.decided(
-            float(found.values[i]) / MICROMETRE,
-            float(causes.u[i]),
-            test.limit_um(float(found.lengths[i])),
-            signed=name in SIGNED,
-            measurement=int(of[i, 0]) if one[i] else None,
-            repeat=int(repeats[i, 0]) if one[i] and same[i] else None,
-            length_mm=float(found.lengths[i]),
-            position=found.names[i] if found.names else NOTHING,
-            set_aside=bool(aside[i]),
-        )
-        for i in range(len(found.values))
-    )
+    items = test.each_decided(
+        found.values / MICROMETRE, causes.u, found.lengths, signed=name in SIGNED, set_aside=aside,
+        measurement=[int(number) if alone else None for number, alone in zip(of[:, 0], one, strict=True)],
+        repeat=[int(turn) if alone else None for turn, alone in zip(repeats[:, 0], one & same, strict=True)],
+        position=found.names,
+    )  # fmt: skip
     worst = least_favourable(items)
     budget, i = None, items.index(worst)
     if lines == LENGTH_LINES and found.u is not None:
@@ -226,11 +206,15 @@ def whole(asked: CompleteTest, artefact: Artefact) -> tuple[Condition, ...]:
     return tuple(found)
 
 
+def form_unstated(artefact: ArtefactFacts) -> str | None:
+    key = artefact.form_key
+    return key if key is not None and not getattr(artefact, key) else None
+
+
 def _unstated(lines: tuple[str, ...], artefact: ArtefactFacts) -> str | None:
     """The key of ``[artefact]`` without which there is no uncertainty."""
     if lines == FORM_LINES:
-        key = artefact.form_key
-        return key if key is not None and not getattr(artefact, key) else None
+        return form_unstated(artefact)
     keys = [value.u_key for value in artefact.certified_values if value.u_key]
     known = any(getattr(artefact, key, None) for key in keys)
     return None if known or not keys or lines != LENGTH_LINES or not artefact.traced else keys[0]

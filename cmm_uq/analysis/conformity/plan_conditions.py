@@ -35,17 +35,21 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
         asked = say("four space diagonals and three axes")
     missing = tuple(
         say("{lengths} different lengths ({line}: {count})", lengths=wanted, line=line, count=count)
-        for line, count in counts.items() if count < wanted
-    )  # fmt: skip
+        for line, count in counts.items()
+        if count < wanted
+    )
     every = list(counts.values())
     span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
     return (
         Condition(say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked, absent),
         _long_enough(plan, artefact.points.machine, often),
         Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing),
-        _spread(plan, often), _shortest(plan, often), _repeated(plan, places), *_both_sides(plan, often),
+        _spread(plan, often),
+        _shortest(plan, often),
+        _repeated(plan, places),
+        *_both_sides(plan, often),
         *_offset(plan, artefact),
-    )  # fmt: skip
+    )
 
 
 def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
@@ -83,22 +87,23 @@ def _both_sides(plan: LengthPlan, places: _Places) -> tuple[Condition, ...]:
     counts = {line: sum(bool(one.bidirectional) for one in found) for line, found in places.items()}
     missing = tuple(
         say("{lengths} bidirectional lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
-        for line, count in counts.items() if count < min(plan.lengths, len(places[line]))
-    )  # fmt: skip
+        for line, count in counts.items()
+        if count < min(plan.lengths, len(places[line]))
+    )
     if not known:
         missing = (say("bidirectional lengths: from which side each end was reached is not recorded"),)
         remedy = Verbatim("columns approach_x, approach_y, approach_z")
     elif not any(known):
-        missing = (say(
-            "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
-        ),)  # fmt: skip
+        missing = (
+            say(
+                "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
+            ),
+        )
     return (Condition(what, missing, remedy),)
 
 
 @dataclass(frozen=True)
 class _Measured:
-    """All that was measured of one nominal length in one position."""
-
     position: Text
     length: float
     share: float | None
@@ -148,14 +153,17 @@ def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Conditi
     least = say("{least_share:.0f} %", least_share=100 * plan.least_share)
     what = say("longest length at least {least} of the travel along each line", least=least)
     if not np.all(np.isfinite(machine.travel_mm)):
-        travel = say("the travel of all three axes{key}, without which no length's share of it is known",
-                     key=at_key("[machine] travel_mm"))  # fmt: skip
+        travel = say(
+            "the travel of all three axes{key}, without which no length's share of it is known",
+            key=at_key("[machine] travel_mm"),
+        )
         return Condition(say("{what}: not known", what=what), (travel,))
     shares = {line: 100 * max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
     missing = tuple(
         say("length of at least {least} of the travel ({line}: {share:.0f} %)", least=least, line=line, share=share)
-        for line, share in shares.items() if share < 100 * plan.least_share
-    )  # fmt: skip
+        for line, share in shares.items()
+        if share < 100 * plan.least_share
+    )
     every = list(shares.values())
     span = say("{low:.0f} % to {high:.0f} %", low=min(every), high=max(every)) if every else say("none")
     return Condition(say("{what}: {span}", what=what, span=span), missing)
@@ -208,8 +216,9 @@ def _repeated(plan: LengthPlan, places: _Places) -> Condition:
     total = sum(min(count, wanted) for counts in repeats.values() for count in counts)
     missing: list[Text] = [
         say("{repeats} repetitions of each length ({line}: {counts})", repeats=wanted, line=line, counts=counts[-1])
-        for line, counts in repeats.items() if counts[-1] < wanted
-    ]  # fmt: skip
+        for line, counts in repeats.items()
+        if counts[-1] < wanted
+    ]
     if total < plan.total:
         missing.append(say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total))
     what = say("{repeats} repetitions of each, {wanted} lengths in all: {total}",
@@ -249,8 +258,9 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     lines = tuple(say("position {along}", along=along) for along in absent)
     asked = say("along the axes, and the face and space diagonals of the volume")
     if lines:
-        asked = say("along the axes, and the face and space diagonals of the volume; missing: {missing}",
-                    missing=commas(lines))  # fmt: skip
+        asked = say(
+            "along the axes, and the face and space diagonals of the volume; missing: {missing}", missing=commas(lines)
+        )
     positions = say("at least {wanted} positions of the bar: {count}", wanted=wanted, count=count)
     return Condition(positions, tuple(missing)), Condition(asked, lines)
 

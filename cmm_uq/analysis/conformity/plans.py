@@ -96,8 +96,6 @@ def _signed(u: Floats, counts: NDArray[np.bool_]) -> Text:
 
 @dataclass(frozen=True)
 class LengthPlan:
-    """Calibrated lengths along lines through the volume."""
-
     positions: tuple[Text, ...]
     lengths: int  # different ones in each position
     repeats: int  # of each length in each position
@@ -133,8 +131,6 @@ class BarPlan:
 
 @dataclass(frozen=True)
 class SpherePlan:
-    """Points on a test sphere."""
-
     points: int  # different ones on each sphere, or more
     reach_deg: float  # no direction of the hemisphere is farther than this from the nearest point
     diameter_mm: tuple[float, float] = (0.0, np.inf)  # least and largest of the sphere

@@ -32,19 +32,13 @@ REPEATS, LEAST_TARGETS, PER_METRE = 5, 5, 5.0  # runs in each direction, targets
 DIAGONALS, _MOVES, _MOST = 4, 0.1, 2 / 3  # least cosine with each axis, and part of its travel that each crosses
 _APART = 5.0  # degrees between targets of a circle, at most: a path that is recorded as it goes has no targets
 _TITLES = {
-    "A": say("bidirectional accuracy of positioning"),
-    "E": say("bidirectional systematic deviation of positioning"),
-    "R": say("bidirectional repeatability of positioning"),
-    "B": say("reversal value"),
-    "M": say("range of the mean bidirectional deviation"),
-    "Ed": say("bidirectional systematic deviation of diagonals"),
-    "Bd": say("reversal value of diagonals"),
-    "G": say("circular deviation"),
-    "H": say("circular hysteresis"),
-    "F": say("radial deviation"),
-    "G(b)": say("bidirectional circular deviation"),
+    "A": say("bidirectional accuracy of positioning"), "E": say("bidirectional systematic deviation of positioning"),
+    "R": say("bidirectional repeatability of positioning"), "B": say("reversal value"),
+    "M": say("range of the mean bidirectional deviation"), "Ed": say("bidirectional systematic deviation of diagonals"),
+    "Bd": say("reversal value of diagonals"), "G": say("circular deviation"), "H": say("circular hysteresis"),
+    "F": say("radial deviation"), "G(b)": say("bidirectional circular deviation"),
     "D": say("mean bidirectional radial deviation"),
-}
+}  # fmt: skip
 
 
 def uncertainty_of_figures(runs: PositioningRuns, under: Circumstances) -> dict[str, float]:
@@ -169,7 +163,6 @@ def _short_of_travel(runs: Runs, artefact: Artefact) -> Iterator[Message]:
 
 
 def _named(runs: Runs) -> list[str]:
-    """Axes that runs are of."""
     return [axis for axis in AXES if any(run.axis == axis for run in runs.values())]
 
 
@@ -262,42 +255,36 @@ OF_AXES = tuple(
 _CIRCLE = say("a full circle in both senses, targets 5° apart at most")
 ISO_230_2 = _characteristics(["A", "E", "R", "B", "M"], axes, "positioning", _RUNS, "u_scale_um_per_m")
 ISO_230_6 = _characteristics(
-    ["Ed", "Bd"],
-    diagonals,
-    "diagonals",
-    say("four body diagonals, five runs in each direction, five targets a metre and five at least"),
-    "u_scale_um_per_m",
-)
+    ["Ed", "Bd"], diagonals, "diagonals",
+    say("four body diagonals, five runs in each direction, five targets a metre and five at least"), "u_scale_um_per_m",
+)  # fmt: skip
 _OF_CIRCLES = partial(_characteristics, of=circles, what="circles", asked=_CIRCLE)  # only F and D rest on the radius
 ISO_230_4_1996 = (*_OF_CIRCLES(["G", "H"], key=""), *_OF_CIRCLES(["F"], key="u_bar_um"))
 ISO_230_4_2005 = (*_OF_CIRCLES(["G(b)"], key=""), *_OF_CIRCLES(["D"], key="u_bar_um"))
 
 _ISO_230_2 = (
     Clause(
-        "scope",
-        say("scope"),
+        "scope", say("scope"),
         "Linear axes up to 2 m, both directions; of longer and of rotary axes the same formulas.",
         "its publisher's abstract; 2 m: as commonly reported",
     ),
     Clause(
-        "targets_and_runs",
-        say("targets and runs"),
+        "targets_and_runs", say("targets and runs"),
         "Five runs in each direction; five targets a metre and five at least, the axis at rest at each: readings in motion "
         "are not decided. Each axis over two thirds of its travel. That targets are not evenly spaced is not asked for.",
         "as commonly reported; at rest: GOST ISO 230-2-2016, its translation; two thirds: this project",
     ),
     Clause(
-        "formulas", say("figures"), "A, E, R, B and M with twice the standard uncertainty estimators, n − 1.", REPORTED
+        "formulas", say("figures"), "A, E, R, B and M with twice the standard uncertainty estimators, n − 1.", REPORTED,
     ),
     Clause(
-        "test_uncertainty",
-        say("test uncertainty"),
+        "test_uncertainty", say("test uncertainty"),
         "Instrument, alignment, temperature and changes between readings, by "
         "draws; the formulas of its annex are not used.",
         CHOSEN,
     ),
     ITS_RULE,
-)
+)  # fmt: skip
 
 _ISO_230_4 = (
     Clause(

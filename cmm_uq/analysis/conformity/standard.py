@@ -122,7 +122,6 @@ class Test:
     left_out: OutsideReadings | None = None
 
     def error(self, problem: str, of: str = "standard", fix: str = "Leave the statement out") -> CmmUqError:
-        """One of a key of this statement."""
         return CmmUqError(problem, where=f"job.toml {self.key} {of}", fix=fix)
 
     def set_aside(self, rows: Ints) -> NDArray[np.bool_]:
@@ -136,7 +135,6 @@ class Test:
         return bool(self.set_aside(np.flatnonzero(own)[:, None]).any())
 
     def indications(self) -> Indications:
-        """Errors of indication of the calibrated lengths."""
         found = self.artefact.indications()
         if found is None:
             problem = f"{self.facts.standard} compares with calibrated lengths, and the {self.artefact.kind} has none"
@@ -169,7 +167,6 @@ class Test:
         return bool(self.characteristic.lines) and not self.unstated
 
     def _length(self, length_mm: float | None) -> float:
-        """A length, the artefact's size by default."""
         return self.artefact.sizes[0].nominal if length_mm is None else length_mm
 
     def decide(
@@ -202,6 +199,20 @@ class Test:
         where = (measurement, repeat, length_mm, position)
         return Decided(value_um, u_um, limit_um, decision, *where, set_aside=set_aside)
 
+    def each_decided(
+        self, values_um: Floats, u_um: Floats, lengths_mm: Floats, *, signed: bool, measurement: Sequence[int | None],
+        set_aside: NDArray[np.bool_], repeat: Sequence[int | None] = (), position: Sequence[Text] = (),
+    ) -> tuple[Decided, ...]:  # fmt: skip
+        """Values (m,), with their standard uncertainties, each against the limit of its length, mm."""
+        count = len(values_um)
+        columns = (each.tolist() for each in (values_um, u_um, self.limits_um(lengths_mm), lengths_mm, set_aside))
+        of = measurement, repeat or [None] * count, position or [NOTHING] * count
+        return tuple(
+            self.decided(value, u, limit, signed=signed, measurement=number, repeat=turn, length_mm=length,
+                         position=where, set_aside=aside)
+            for value, u, limit, length, aside, number, turn, where in zip(*columns, *of, strict=True)
+        )  # fmt: skip
+
     def least_u(self, lengths_mm: Floats) -> Floats:
         """(m,) µm: half the laboratory's capability, k = 2 (ILAC-P14:09/2020), at lengths (m,); 0 where none is given."""
         cmc = self.circumstances.cmc
@@ -218,13 +229,11 @@ class Test:
         return PriorKnowledge(given.mean_um, given.sd_um or (given.share_of_limit or 0.0) * limit_um)
 
     def refuse_without_uncertainty(self, u: float, name: str) -> None:
-        """Refuse a rule that needs an uncertainty where there is none."""
         if u <= 0 and rules.needs_uncertainty(self.facts.rule) and not self.answered:
             problem, fix = needed(name, self.facts)
             raise self.error(problem, "rule", fix)
 
     def refuse_nothing_measured(self, measured: bool, what: str) -> None:
-        """Refuse a statement on something of which the recording has nothing."""
         if not measured:
             asked = f"{self.characteristic.name} of {self.facts.standard} is decided on {what}"
             fix = "Record them, or leave the statement out"
@@ -327,7 +336,6 @@ def _set_aside(reasons: Mapping[int, str]) -> list[Text]:
 
 
 def characteristic_of(standard: Standard, facts: ConformityFacts, key: str) -> Characteristic:
-    """The characteristic that a job wishes to be decided."""
     try:
         return standard.characteristic(facts.characteristic)
     except ValueError as error:

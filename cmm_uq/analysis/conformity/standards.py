@@ -11,6 +11,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity import decided, four_axis, own_rule, plans, positioning
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, repeats_of_gauge, supplemented
+from cmm_uq.analysis.conformity.own_rule import form_unstated
 from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, characteristic_of
@@ -27,18 +28,10 @@ from cmm_uq.maths.uncertainty.quantity import Quantity, nominal
 
 
 def length_unstated(artefact: ArtefactFacts) -> str | None:
-    """The key without which a calibrated length has no uncertainty."""
     return "u_um" if artefact.certified and not artefact.u_um else None
 
 
-def form_unstated(artefact: ArtefactFacts) -> str | None:
-    """The key without which a form has no uncertainty."""
-    key = artefact.form_key
-    return key if key is not None and not getattr(artefact, key) else None
-
-
 def diameter_allowed(test: Test, plan: plans.SpherePlan) -> tuple[Condition, ...]:
-    """A test sphere of the size that the standard asks for."""
     (low, high), diameter = plan.diameter_mm, test.artefact.sizes[0].nominal
     what = say("test sphere of {low:g} to {high:g} mm", low=low, high=high)
     lacks = say("{what} ({diameter} mm)", what=what, diameter=nominal(diameter))
@@ -46,7 +39,6 @@ def diameter_allowed(test: Test, plan: plans.SpherePlan) -> tuple[Condition, ...
 
 
 def sensing_stated(test: Test) -> tuple[Condition, ...]:
-    """That the probe is optical, for a standard of optical probes alone."""
     what = say('an optical probe ([probe] sensing = "optical")')
     return (Condition(what, () if test.circumstances.probe.sensing == "optical" else (what,)),)
 
@@ -83,21 +75,27 @@ def orientations(plan: plans.ShortLengthPlan, artefact: Artefact, *, recorded: b
 
 _LENGTHS = ("E0", "E150")
 
-_UNCERTAINTY = (
-    Clause("test_uncertainty", say("test uncertainty"), "Calibration, expansion, temperature, alignment and fixturing of "
-           "the artefact, root of the sum of squares; the machine's own errors and scatter are no part of it.",
-           "ISO/TS 23165:2006, as commonly reported")
-)  # fmt: skip
-_ASME_RULE = (
-    Clause("decision_rule", say("default decision rule"), 'ISO 14253-1, where the job names no other; "ASME B89.7.3.1" '
-           "is simple acceptance at 4 : 1.", "that 4 : 1 by ASME B89.7.3.1 is its own default: as commonly reported; ISO "
-           "14253-1 is the stricter for whoever states a pass")
-)  # fmt: skip
-_SET_ASIDE = (
-    Clause("data_rejection", say("readings that are left out"), "None is left out of a decision: what is set aside "
-           "counts as outside.", "ASME B89.7.3.1-2001, 2, as quoted publicly: rejected only by a documented policy or "
-           "with a physical cause", True)
-)  # fmt: skip
+_UNCERTAINTY = Clause(
+    "test_uncertainty",
+    say("test uncertainty"),
+    "Calibration, expansion, temperature, alignment and fixturing of "
+    "the artefact, root of the sum of squares; the machine's own errors and scatter are no part of it.",
+    "ISO/TS 23165:2006, as commonly reported",
+)
+_ASME_RULE = Clause(
+    "decision_rule",
+    say("default decision rule"),
+    'ISO 14253-1, where the job names no other; "ASME B89.7.3.1" is simple acceptance at 4 : 1.',
+    "that 4 : 1 by ASME B89.7.3.1 is its own default: as commonly reported; ISO "
+    "14253-1 is the stricter for whoever states a pass",
+)
+_SET_ASIDE = Clause(
+    "data_rejection",
+    say("readings that are left out"),
+    "None is left out of a decision: what is set aside counts as outside.",
+    "ASME B89.7.3.1-2001, 2, as quoted publicly: rejected only by a documented policy or with a physical cause",
+    True,
+)
 _ISO_10360_2 = (
     Clause("scope", say("scope"), "Cartesian machines with contacting probes, point by point; an optical probe is "
            "refused.", "its publisher's abstract", True),
@@ -198,11 +196,6 @@ _RULES = {
 }  # fmt: skip
 
 
-def _sphere(scope: str) -> tuple[Clause, ...]:
-    first = Clause("scope", say("scope"), scope, "its publisher's abstract", True)
-    return (first, *(one for one in _ISO_10360_5[1:] if one.name != "sphere_size"))
-
-
 # Of each standard that is decided here, and of the documents that decisions and budgets go by
 CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
     **positioning.CLAUSES,
@@ -215,7 +208,10 @@ CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
     ),
     "ISO 10360-5:2010": _ISO_10360_5,
     "ISO 10360-5:2020": _ISO_10360_5,
-    "ISO 10360-8:2013": _sphere("Cartesian machines with optical distance sensors."),
+    "ISO 10360-8:2013": (
+        Clause("scope", say("scope"), "Cartesian machines with optical distance sensors.", "its publisher's abstract", True),
+        *(one for one in _ISO_10360_5[1:] if one.name != "sphere_size"),
+    ),
     "ASME B89.4.1-1997": _B89,
     "VDI/VDE 2617-2.1": _VDI,
     "VDI/VDE 2617": _ISO_10360_2[1:],
@@ -235,7 +231,6 @@ def _asked_of_gauges(test: Test) -> tuple[Condition, ...]:
 
 
 def _lengths(name: str, chosen: decided.Chosen, conditions: Callable[..., tuple[Condition, ...]]) -> Characteristic:
-    """Errors of indication of calibrated lengths, none of them measured again."""
     errors = partial(decided.errors_of_indication, chosen=chosen)
     return Characteristic(name, LENGTHS, errors, conditions, length_unstated, lines=LENGTH_LINES)
 
@@ -258,13 +253,13 @@ _R0 = Characteristic(
 def _of_sphere(
     form: tuple[str, ...], size: tuple[str, ...], plan: plans.SpherePlan, asks: Callable[[Test], tuple[Condition, ...]]
 ) -> tuple[Characteristic, ...]:
-    """Form and size error of a test sphere, each by its name and its other names."""
     return tuple(
         Characteristic(name, FORMS, errors, partial(conditions, plan), unstated, asks, tuple(also), lines=lines)
         for (name, *also), errors, unstated, lines in (
             (form, decided.form_error, form_unstated, FORM_LINES),
-            (size, decided.size_error, length_unstated, SIZE_LINES))
-    )  # fmt: skip
+            (size, decided.size_error, length_unstated, SIZE_LINES),
+        )
+    )
 
 
 _DIAMETER = partial(diameter_allowed, plan=plans.ISO_10360_5)

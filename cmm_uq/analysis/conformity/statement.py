@@ -139,20 +139,13 @@ TOLERANCE_WORDS = {outcome: word for word, outcome in TOLERANCE_OUTCOMES.items()
 
 
 def by_standard(statement: Statement) -> Verdict:
-    """A statement by a standard, with the value that is least favourable."""
     U = 2 * statement.u_um if statement.u_um > 0 else None
     return Verdict(statement.characteristic, statement.outcome, statement.value_um, U, statement.limit_um, UNITS["µm"],
                    statement.facts.standard, statement.quantity, statement.missing)  # fmt: skip
 
 
 def by_tolerance(
-    name: str,
-    title: Text,
-    quantity: Quantity,
-    tolerance: float,
-    *,
-    determined: bool = True,
-    against: Sequence[Text] = (),
+    name: str, title: Text, quantity: Quantity, tolerance: float, *, determined: bool = True, against: Sequence[Text] = ()
 ) -> Verdict:
     """A parameter, named as ``scale_x.ppm`` and in words, against its tolerance by its whole 95 % interval (ISO 14253-1).
 
@@ -175,8 +168,6 @@ NOT_INSIDE = (*OUTSIDE, "undecided", "conditional pass")
 
 @dataclass(frozen=True)
 class Remeasurement:
-    """What a standard lets be measured again."""
-
     repeats: int  # of each length in the test itself
     outside: int
     lengths: int

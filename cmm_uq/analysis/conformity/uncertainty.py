@@ -30,14 +30,11 @@ NORMAL_EXPANSION = 8e-6, 13e-6
 STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6  # 1/K; of what gauges are made of, aluminium expands most
 
 _NAMES = {
-    "calibration": say("calibration of the artefact"),
-    "expansion": say("expansion coefficient of the artefact"),
-    "temperature": say("temperature of the artefact"),
-    "alignment": say("alignment of the artefact"),
-    "fixturing": say("fixturing of the artefact"),
-    "form": say("calibration of the form"),
+    "calibration": say("calibration of the artefact"), "expansion": say("expansion coefficient of the artefact"),
+    "temperature": say("temperature of the artefact"), "alignment": say("alignment of the artefact"),
+    "fixturing": say("fixturing of the artefact"), "form": say("calibration of the form"),
     "repeat": say("what of the artefact changes between the readings"),
-}
+}  # fmt: skip
 
 
 def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
@@ -156,8 +153,10 @@ def normal_expansion(cte: float | None) -> tuple[Condition, ...]:
         return ()
     what = say(
         "a length of normal expansion, {low:g} to {high:g} × 10⁻⁶ /K (that of the gauge is {cte:.3g} × 10⁻⁶ /K)",
-        low=low * 1e6, high=high * 1e6, cte=cte * 1e6,
-    )  # fmt: skip
+        low=low * 1e6,
+        high=high * 1e6,
+        cte=cte * 1e6,
+    )
     return (Condition(what, (what,)),)
 
 
@@ -169,8 +168,10 @@ def unknown_expansion(artefact: Artefact, cte_per_k: float | None) -> Text:
     return say(
         "The artefact was up to {away:.2g} K from 20 °C and its expansion is not stated{key}: its lengths "
         "are taken as those at 20 °C, which for steel is {steel:.2g} µm wrong in a metre.",
-        away=away, steel=11.5 * away, key=at_key("[artefact] cte_per_k"),
-    )  # fmt: skip
+        away=away,
+        steel=11.5 * away,
+        key=at_key("[artefact] cte_per_k"),
+    )
 
 
 def _lacks(what: Text, remedy: str) -> Condition:
@@ -228,7 +229,6 @@ def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Cond
 
 
 def rated_in_words(rated: RatedConditions) -> list[Text]:
-    """Who answers for rated conditions that are not stated, and why."""
     if rated.declared is None:
         return []
     by, reason = Verbatim(rated.declared.by), Verbatim(rated.declared.reason.rstrip(". "))
@@ -289,8 +289,6 @@ _AT_ONCE = 2_000_000  # Numbers that are held at once
 
 @dataclass(frozen=True, eq=False)
 class Causes:
-    """What makes m test values uncertain."""
-
     # (m, s) by how much one standard uncertainty of each cause that all values share changes each value, µm, with sign
     shared: Floats
     own: Floats  # (m,) standard uncertainty that values of one set-up share, µm
@@ -352,8 +350,9 @@ def _own(u: Floats, beside: Floats | float) -> Floats:
     return np.asarray(np.where(np.asarray(beside) > 0, np.sqrt(np.maximum(u**2 - np.asarray(beside) ** 2, 0.0)), u))
 
 
-def probability_of_all(values: Sequence[float] | Floats, limits: Sequence[float] | Floats, causes: Causes, *,
-                       signed: bool) -> float | None:  # fmt: skip
+def probability_of_all(
+    values: Sequence[float] | Floats, limits: Sequence[float] | Floats, causes: Causes, *, signed: bool
+) -> float | None:
     """Probability that all quantities lie within their limits, given what was measured; ``None`` without an uncertainty.
 
     Of what is shared the largest cause, or of each set-up its own, is integrated exactly; over the others an even sequence

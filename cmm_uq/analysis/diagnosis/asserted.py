@@ -14,19 +14,13 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
-from cmm_uq.analysis.diagnosis.comparison.equivalence import equivalent_sets
+from cmm_uq.analysis.diagnosis.comparison.equivalence import AlternativeSet, alternative_sets
 from cmm_uq.analysis.diagnosis.comparison.explanations import effect_of
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm, families_of
 from cmm_uq.analysis.diagnosis.empirical.model import ODDS
-from cmm_uq.analysis.diagnosis.joint import (
-    JointPosterior,
-    Mode,
-    WithheldEffect,
-    period_modes,
-    withheld_effect,
-)
+from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, say
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import LinearModel, solve
@@ -40,21 +34,7 @@ _ODDS = 0.05
 
 
 @dataclass(frozen=True)
-class AlternativeSet:
-    """Effects that together could stand in the place of others; see :class:`EquivalentSet`."""
-
-    instead_of: tuple[str, ...]
-    effects: tuple[str, ...]
-    titles: tuple[Text, ...]
-    sizes: tuple[float, ...]
-    odds: float
-    prior_odds: float
-
-
-@dataclass(frozen=True)
 class OmittedEffect:
-    """An effect that the model left out."""
-
     effect: str  # effect, title: its name, and in words
     title: Text
     probability: float  # among all candidates that could stand in its place, nothing and nonparametric terms included
@@ -76,7 +56,9 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
     linear, first = result.model.estimate().linear, _squares(before.estimate().linear, ())
     total = first - _squares(linear, ())
-    listed, sets = [], _alternatives(result)
+    listed, sets, combinations = [], tuple[AlternativeSet, ...](), result.combinations
+    if combinations is not None and result.chosen:
+        sets = alternative_sets(result.first.comparison, combinations, result.chosen, result.versions)
     for effect in (e for e in result.model.effects if e.name in result.effects):
         modes = period_modes(result, index[effect.name])
         known = not modes or jointly.period_settled(result, index[effect.name], modes)
@@ -111,24 +93,6 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
-def _alternatives(result: SearchResult) -> tuple[AlternativeSet, ...]:
-    if result.combinations is None or not result.chosen:
-        return ()
-    every = result.first.explanations
-    names = [str.__str__(e.name) for e in every]
-    return tuple(
-        AlternativeSet(
-            tuple(names[i] for i in one.instead_of),
-            tuple(names[i] for i in one.members),
-            tuple(effect_of(every[i]).title for i in one.members),
-            one.sizes,
-            one.odds,
-            one.prior_odds,
-        )
-        for one in equivalent_sets(result.first.comparison, result.combinations, result.chosen, result.versions)
-    )
-
-
 def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
     """Of an effect by itself, and with all that could stand in its place; and the names of those."""
     combinations = result.combinations
@@ -160,9 +124,12 @@ def indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
 
 def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
     """Effects that are not to be named; where there are none, whether a function is shown beside those that are."""
-    gone = _improbable(result)
-    data = _fit(result) if result.chosen and not gone else None
-    if data is None:
+    gone = dict[int, WithheldEffect]()
+    for i in result.chosen if result.combinations is not None else ():
+        if _probability(result, i, known=_known(result, i))[1] < NAMED:
+            gone[i] = withheld_effect(result, i, IMPROBABLE)
+    data = FunctionFit.of(result, families_of(result)) if result.chosen and not gone else None
+    if data is None or not data.families or not data.degrees:
         return gone, False
     beside = _likeliest(data) if data.total - data.nothing > np.log(ODDS) else None
     for i in sorted(result.chosen):
@@ -181,22 +148,10 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
     return gone, beside is not None
 
 
-def _improbable(result: SearchResult) -> dict[int, WithheldEffect]:
-    if result.combinations is None:
-        return {}
-    each = {i: _probability(result, i, known=_known(result, i))[1] for i in result.chosen}
-    return {i: withheld_effect(result, i, IMPROBABLE) for i, together in each.items() if together < NAMED}
-
-
 def _known(result: SearchResult, index: int) -> bool:
     """Whether an effect has no period, or one that is settled; of others functions of the same reading are named with it."""
     modes = period_modes(result, index)
     return not modes or jointly.period_settled(result, index, modes)
-
-
-def _fit(result: SearchResult) -> FunctionFit | None:
-    data = FunctionFit.of(result, families_of(result))
-    return data if data.families and data.degrees else None
 
 
 def _likeliest(data: FunctionFit) -> FunctionTerm:

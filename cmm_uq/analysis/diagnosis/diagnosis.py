@@ -49,8 +49,6 @@ EffectParameters = Mapping[str, Mapping[str, Quantity]]
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A combination of explanations that remains."""
-
     probability: float  # among all combinations, with what adds nothing to it
     effects: tuple[str, ...]  # names of the effects that it adds to the model
     functions: tuple[Text, ...]
@@ -70,7 +68,6 @@ class ModelAverage:
 
     @property
     def weights(self) -> list[float]:
-        """Probabilities of the rivals, which leave out what is less probable than each of them."""
         return [rival.probability for rival in self.rivals]
 
 
@@ -193,8 +190,6 @@ _NOISE_KIND = 0.9
 
 @dataclass(frozen=True)
 class NoiseDiagnosis:
-    """What the noise is like once everything found is modelled; lengths in µm."""
-
     coordinate: Quantity
     placing: Quantity
     correlated_in_time: bool
@@ -204,8 +199,6 @@ class NoiseDiagnosis:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """See the module's docstring."""
-
     verdict: str  # one of :data:`VERDICTS`
     p_value: float
     alpha: float
@@ -230,7 +223,6 @@ class Diagnosis:
 
     @property
     def agrees(self) -> bool:
-        """Whether nothing is found to be missing."""
         return self.verdict in AGREES
 
 

@@ -34,14 +34,11 @@ _TOLD = 1e-3  # probability from which a mode is told
 
 @dataclass(frozen=True)
 class Mode:
-    """A period, its interval within this mode, and how probable the mode is among all."""
-
     period: Quantity
     probability: float
     ends: tuple[float, float]  # are the lowest and the highest value that belong to it
 
     def holds(self, shape: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Which values (N,) belong to it."""
         return (shape >= self.ends[0]) & (shape <= self.ends[1])
 
 

@@ -31,8 +31,6 @@ _MOST = 4  # places that are told
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a mismatch lives."""
-
     covariate: str
     # of that covariate, where the function is larger than half its maximum and its band does not hold zero, or between
     # which values it jumps
@@ -185,8 +183,6 @@ _SEEN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ResidualField:
-    """Residuals where they lie."""
-
     place: Floats  # (q, 3) readings of the scales, mm
     # before, after: (q, 3) µm, indicated minus modelled, by the job's model and by that with what was left out
     before: Floats

@@ -7,7 +7,7 @@ observations, as a table of deviations is that was joined wrongly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import combinations, permutations, product
@@ -48,22 +48,17 @@ class Hypothesis:
     unit: Unit = ONE
 
     @classmethod
-    def free(
-        cls,
-        name: str,
-        family: str,
-        title: Callable[[Text, Text], Text],
-        remedy: Text,
-        ends: tuple[float, float],
-        change: Callable[[Floats], Floats],
-        of: Unit,
-    ) -> Hypothesis:
-        values = np.linspace(*ends, VALUES)
-        return cls(name, family, title, remedy, change(values), values, change, of)
-
-    @classmethod
     def fixed(cls, name: str, family: str, title: Text, remedy: Text, change: Floats) -> Hypothesis:
         return cls(name, family, lambda value, u: title, remedy, change[:, None], np.zeros(1))
+
+
+def _free(
+    name: str, family: str, title: Callable[[Text, Text], Text], remedy: Text, ends: tuple[float, float],
+    change: Callable[[Floats], Floats], of: Unit,
+) -> Hypothesis:  # fmt: skip
+    """Any value between two ends."""
+    values = np.linspace(*ends, VALUES)
+    return Hypothesis(name, family, title, remedy, change(values), values, change, of)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,21 +110,14 @@ def hypotheses(p: PredictedObservations, comparison: CandidateComparison) -> Ite
 
 def _factors(p: PredictedObservations) -> Iterator[Hypothesis]:
     """All errors the other way, not there, twice, in another unit, or any number of times."""
-    sign, turn = (
-        say("all predicted errors have the other sign"),
-        say("Turn the sign of these errors round in the simulation."),
-    )
+    turn = say("Turn the sign of these errors round in the simulation.")
+    sign = say("all predicted errors have the other sign")
     yield Hypothesis.fixed("sign", "factor", sign, turn, -2 * p.usual)
     remedy = say(
         "Look in the simulation, and in the machine's compensation, for what would apply these errors so many times."
     )
-    for name, factor in (
-        ("not_applied", 0.0),
-        ("half", 0.5),
-        ("twice", 2.0),
-        ("inches", 1 / 25.4),
-        ("millimetres", 25.4),
-    ):
+    factors = {"not_applied": 0.0, "half": 0.5, "twice": 2.0, "inches": 1 / 25.4, "millimetres": 25.4}
+    for name, factor in factors.items():
         title = say("the machine has the predicted errors {factor} times", factor=number(factor, ".3g"))
         yield Hypothesis.fixed(name, "factor", title, remedy, (factor - 1) * p.usual)
 
@@ -138,9 +126,7 @@ def _factors(p: PredictedObservations) -> Iterator[Hypothesis]:
 
     # of errors that are not exact themselves the factor would come out too near to none
     if np.mean(p.found.u**2) <= _EXACT * np.mean(p.usual**2):
-        yield Hypothesis.free(
-            "factor", "factor", named, remedy, _FACTORS, lambda v: p.usual[:, None] * (v - 1), unit("1")
-        )
+        yield _free("factor", "factor", named, remedy, _FACTORS, lambda v: p.usual[:, None] * (v - 1), unit("1"))
 
 
 def _lengths(p: PredictedObservations) -> Iterator[Hypothesis]:
@@ -161,9 +147,7 @@ def _lengths(p: PredictedObservations) -> Iterator[Hypothesis]:
     def named(value: Text, u: Text) -> Text:
         return say("the artefact was simulated {ppm} ± {u} ppm too long", ppm=value, u=u)
 
-    yield Hypothesis.free(
-        "length", "length", named, remedy, _LONGER, lambda v: -1e-6 * length[:, None] * v, unit("ppm")
-    )
+    yield _free("length", "length", named, remedy, _LONGER, lambda v: -1e-6 * length[:, None] * v, unit("ppm"))
 
 
 def _upper(axes: list[str] | str) -> Text:
@@ -232,7 +216,7 @@ def _shifts(p: PredictedObservations, field: Field) -> Iterator[Hypothesis]:
         remedy = say("Shift the simulation's map along {axis}, or mend its origin.", axis=letter)
         if most > 0:
             shifts = (-most, most), partial(change, own), unit("mm")
-            yield Hypothesis.free(f"shift_{axis}", "place", partial(named, letter), remedy, *shifts)
+            yield _free(f"shift_{axis}", "place", partial(named, letter), remedy, *shifts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,47 +297,37 @@ def exchanged_rows(p: PredictedObservations) -> Iterator[Hypothesis]:
 
 @dataclass(frozen=True, eq=False)
 class _Numbering:
-    """Set-ups, and the points of each."""
-
-    numbers: list[int]
+    numbers: list[int]  # set-ups, and the points of each
     points: dict[int, list[int]]
 
     def exchanges(self) -> Iterator[tuple[str, Text, Callable[[Key], Key]]]:
         """Name, title, and whose row stands in the place of a set-up's point."""
+        numbers, last = self.numbers, self.numbers[::-1]
         yield "points_reversed", say("points are numbered from the other end in every set-up"), self.back
-        yield "set_ups_reversed", say("set-ups are numbered from the other end"), self.last_first
+
+        def renumbered(others: Sequence[int], key: Key) -> Key:
+            return others[numbers.index(key[0])], key[1]
+
+        yield "set_ups_reversed", say("set-ups are numbered from the other end"), partial(renumbered, last)
         for name, by in (("next", 1), ("previous", -1)):
-            yield f"set_ups_on_{name}", say("set-ups are numbered one on, or one back"), partial(self.on, by)
-        for n in self.numbers if len(self.numbers) > 1 else ():
+            on = partial(renumbered, [*numbers[by:], *numbers[:by]])
+            yield f"set_ups_on_{name}", say("set-ups are numbered one on, or one back"), on
+        for n in numbers if len(numbers) > 1 else ():
             title = say("points are numbered from the other end in set-up {number}", number=n)
-            yield f"points_reversed_in_{n}", title, partial(self.back_in, n)
-        both, every = (
-            list(combinations(each, 2)) for each in (self.numbers, sorted(set().union(*self.points.values())))
-        )
+            yield f"points_reversed_in_{n}", title, partial(self.back, only=n)
+        both, every = (list(combinations(each, 2)) for each in (numbers, sorted(set().union(*self.points.values()))))
         for pair in both if len(both) <= _MOST_ROWS else ():
             title = say("set-ups {one} and {other} are exchanged", one=pair[0], other=pair[1])
-            yield f"set_ups_{pair[0]}_{pair[1]}", title, partial(_set_ups_swapped, pair)
+            yield f"set_ups_{pair[0]}_{pair[1]}", title, partial(_swapped, pair, 0)
         for pair in every if len(every) <= _MOST_ROWS else ():
             title = say("points {one} and {other} are exchanged in every set-up", one=pair[0], other=pair[1])
-            yield f"points_{pair[0]}_{pair[1]}", title, partial(_points_swapped, pair)
+            yield f"points_{pair[0]}_{pair[1]}", title, partial(_swapped, pair, 1)
 
-    def back(self, key: Key) -> Key:
+    def back(self, key: Key, only: int | None = None) -> Key:
         own = self.points[key[0]]
-        return key[0], own[len(own) - 1 - own.index(key[1])]
-
-    def back_in(self, only: int, key: Key) -> Key:
-        return self.back(key) if key[0] == only else key
-
-    def last_first(self, key: Key) -> Key:
-        return self.numbers[len(self.numbers) - 1 - self.numbers.index(key[0])], key[1]
-
-    def on(self, by: int, key: Key) -> Key:
-        return self.numbers[(self.numbers.index(key[0]) + by) % len(self.numbers)], key[1]
+        return key if only not in (None, key[0]) else (key[0], own[len(own) - 1 - own.index(key[1])])
 
 
-def _set_ups_swapped(pair: Key, key: Key) -> Key:
-    return (sum(pair) - key[0] if key[0] in pair else key[0]), key[1]
-
-
-def _points_swapped(pair: Key, key: Key) -> Key:
-    return key[0], (sum(pair) - key[1] if key[1] in pair else key[1])
+def _swapped(pair: Key, part: int, key: Key) -> Key:
+    other = sum(pair) - key[part] if key[part] in pair else key[part]
+    return (other, key[1]) if part == 0 else (key[0], other)

@@ -36,8 +36,6 @@ _POINTS = 400
 
 @dataclass(frozen=True, eq=False)
 class NoiseKind:
-    """One shape of the noise."""
-
     name: str
     # (m, m) sparse W; W times the part of such noise that is independent, over that of a reading, is white
     whitening: scipy.sparse.csr_array

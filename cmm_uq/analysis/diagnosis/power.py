@@ -41,8 +41,6 @@ ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned wit
 
 @dataclass(frozen=True, eq=False)
 class Power:
-    """How an effect would be found."""
-
     effect: str
     parameter: str  # parameter, unit: its (first) parameter
     unit: Unit
@@ -150,8 +148,6 @@ def _reached(margin: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Naming:
-    """When one effect alone is called by its name."""
-
     explanations: Sequence[Explanation]
 
     @cached_property

@@ -14,19 +14,12 @@ from typing import Any
 import numpy as np
 import scipy
 
+from cmm_uq.analysis.diagnosis import mistakes
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, comparison_of
 from cmm_uq.analysis.diagnosis.held_out import held_out_groups, predictions
-from cmm_uq.analysis.diagnosis.mistakes import (
-    ONE,
-    VALUES,
-    Hypothesis,
-    PredictedObservations,
-    exchanged_rows,
-    hypotheses,
-)
 from cmm_uq.base.messages import NOTHING as NO_TEXT, Text, number, say, signed
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE, Unit, unit
@@ -49,8 +42,6 @@ _ROUNDED = 0.1  # part of the noise's variance from which rounding is told
 
 @dataclass(frozen=True)
 class SimulationMistake:
-    """A mistake that cannot be excluded."""
-
     name: str
     title: Text
     remedy: Text
@@ -64,7 +55,7 @@ class SimulationMistake:
     elpd_gain_se: float
     value: float | None = None
     u: float | None = None
-    unit: Unit = ONE
+    unit: Unit = mistakes.ONE
 
 
 @dataclass(frozen=True)
@@ -86,7 +77,7 @@ class SimulationMistakes:
 
 @dataclass(frozen=True, eq=False)
 class _Weighed:
-    hypothesis: Hypothesis
+    hypothesis: mistakes.Hypothesis
     log: float  # evidence times the probability beforehand
     alone: float  # log evidence with nothing else missing
     change: Floats  # (m,) at its value, and (m, 0 or 1) for one unit of it
@@ -103,24 +94,23 @@ def simulation_mistakes(
     ``whole`` is the model of all observations, gross outliers included: two points or set-ups exchanged look like these.
     """
     first = result.first
-    said = _judged(
-        first.comparison, PredictedObservations(first.model, first.values, found, of), _physics(result), hypotheses
-    )
+    predicted = mistakes.PredictedObservations(first.model, first.values, found, of)
+    said = _judged(first.comparison, predicted, _physics(result), mistakes.hypotheses)
     if said.named or first.model.artefact is not whole.artefact or np.array_equal(first.model.used, whole.used):
         return said
     every = replace(result.model, used=whole.used)
     comparison = comparison_of(every, result.stated, ())
     nothing = float(np.log(NOTHING) + comparison.log_evidence_of(())[0])
-    seen = PredictedObservations(every, every.estimate().about, found, of)
-    of_all = _judged(comparison, seen, nothing, lambda p, _: exchanged_rows(p))
+    seen = mistakes.PredictedObservations(every, every.estimate().about, found, of)
+    of_all = _judged(comparison, seen, nothing, lambda p, _: mistakes.exchanged_rows(p))
     return of_all if of_all.named else said
 
 
 def _judged(
     comparison: CandidateComparison,
-    predicted: PredictedObservations,
+    predicted: mistakes.PredictedObservations,
     physics: float,
-    of: Callable[[PredictedObservations, CandidateComparison], Iterator[Hypothesis]],
+    of: Callable[[mistakes.PredictedObservations, CandidateComparison], Iterator[mistakes.Hypothesis]],
 ) -> SimulationMistakes:
     model, found = predicted.model, predicted.found
     usual = comparison.rest_of(predicted.usual[:, None])[:, 0]
@@ -135,9 +125,7 @@ def _judged(
     rounded = _rounded(found, base.sigma_of_residuals, rms, before[0])
     empty = SimulationMistakes(len(tried), (), (), NO_TEXT, rms, before[0], rounded)
     total = scipy.special.logsumexp([physics, *(each.log for each in weighed)]) if weighed else physics
-    likely = sorted(
-        (w for w in weighed if w.log - none > np.log(_TOLD) and w.log - physics > np.log(_TOLD)), key=lambda w: -w.log
-    )
+    likely = sorted((w for w in weighed if w.log - max(none, physics) > np.log(_TOLD)), key=lambda w: -w.log)
     if not likely:
         return empty
     told = []
@@ -151,21 +139,12 @@ def _judged(
             value, u = signed(each.value, ".3g"), number(each.u, ".2g")
         told.append(
             SimulationMistake(
-                h.name,
-                h.title(value, u),
-                h.remedy,
-                float(np.exp(each.log - total)),
-                _odds(each.log - none),
-                _odds(each.log - physics),
-                float(np.sqrt(np.mean(fit.residuals**2)) / MICROMETRE),
-                after[0],
-                float(gain.sum()),
-                float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0,
-                each.value,
-                each.u,
-                h.unit,
+                h.name, h.title(value, u), h.remedy, float(np.exp(each.log - total)), _odds(each.log - none),
+                _odds(each.log - physics), float(np.sqrt(np.mean(fit.residuals**2)) / MICROMETRE), after[0],
+                float(gain.sum()), float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0,
+                each.value, each.u, h.unit,
             )
-        )
+        )  # fmt: skip
     # those that cannot be told from the most probable, and as many more as leave all else improbable
     size = sum(likely[0].log - w.log < NAMED for w in likely)
     while (inside := _over(weighed, likely[:size], physics)) < NAMED and size < min(len(likely), _MOST_TOLD):
@@ -225,13 +204,13 @@ def _with_one_more(comparison: CandidateComparison, data: Floats) -> Floats:
     return np.asarray(scipy.special.logsumexp(every, axis=0), dtype=np.float64)
 
 
-def _shows(comparison: CandidateComparison, h: Hypothesis, usual: Floats) -> bool:
+def _shows(comparison: CandidateComparison, h: mistakes.Hypothesis, usual: Floats) -> bool:
     """Whether a mistake changes anything that the model and the set-ups leave."""
     left = np.abs(comparison.rest_of(h.change)).max(initial=0.0)
     return bool(left > _INVISIBLE * max(float(np.abs(usual).max(initial=0.0)), MICROMETRE))
 
 
-def _weighed(comparison: CandidateComparison, tried: list[Hypothesis]) -> list[_Weighed]:
+def _weighed(comparison: CandidateComparison, tried: list[mistakes.Hypothesis]) -> list[_Weighed]:
     families = sorted({h.family for h in tried})
     found: list[_Weighed] = []
     for family in families:
@@ -258,7 +237,7 @@ def _nothing(comparison: CandidateComparison, data: Floats) -> Floats:
     return np.asarray(scipy.special.logsumexp(comparison.of_nothing(data), axis=0), dtype=np.float64)
 
 
-def _with_evidence(comparison: CandidateComparison, h: Hypothesis, prior: float) -> _Weighed:
+def _with_evidence(comparison: CandidateComparison, h: mistakes.Hypothesis, prior: float) -> _Weighed:
     none = np.zeros((len(comparison.left), 0))
     if h.again is None:
         alone = float(_nothing(comparison, _data(comparison, h.change))[0])
@@ -273,7 +252,7 @@ def _with_evidence(comparison: CandidateComparison, h: Hypothesis, prior: float)
         u = float(np.sqrt(2 * squares[i] / max(comparison.degrees_of_freedom, 1) / max(bend, 1e-300)))
         if u > step:
             break
-        values = np.linspace(max(low, values[i] - step), min(high, values[i] + step), VALUES)
+        values = np.linspace(max(low, values[i] - step), min(high, values[i] + step), mistakes.VALUES)
         change = h.again(values)
     at = float(values[int(squares.argmin())]) if u > step else float(values[len(values) // 2])
     values = np.linspace(max(low, at - 6 * u), min(high, at + 6 * u), _FINE)
@@ -294,21 +273,11 @@ def _rounded(found: PredictedErrors, sigma: float, rms_um: float, heldout_um: fl
         return None
     left = float(np.sqrt(max(1 - (rounding / sigma) ** 2, 0.0)))
     step = found.step / MICROMETRE
-    return SimulationMistake(
-        "rounded",
-        say("predictions are rounded to {step:g} µm", step=step),
-        say("Let the simulation write more digits, or state u_um = {u:.2g} in [simulation].", u=rounding / MICROMETRE),
-        1.0,
-        None,
-        None,
-        left * rms_um,
-        left * heldout_um,
-        0.0,
-        0.0,
-        step,
-        0.0,
-        unit("µm"),
-    )
+    title = say("predictions are rounded to {step:g} µm", step=step)
+    u = rounding / MICROMETRE
+    more = say("Let the simulation write more digits, or state u_um = {u:.2g} in [simulation].", u=u)
+    gone = 1.0, None, None, left * rms_um, left * heldout_um, 0.0, 0.0
+    return SimulationMistake("rounded", title, more, *gone, step, 0.0, unit("µm"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -209,8 +209,6 @@ ABSORBED = 1e-5  # part of its length below which a column is the baseline's own
 
 @dataclass(frozen=True)
 class PeriodRange:
-    """Of an effect with a nonlinear parameter, for which values of it the figures hold."""
-
     parameter: str  # parameter, unit: its name and unit
     unit: Unit
     low: float  # low, high: range of what is tried
@@ -222,8 +220,6 @@ class PeriodRange:
 
 @dataclass(frozen=True, eq=False)
 class SmallestEffect:
-    """How large one effect must have been for the recording to show it."""
-
     effect: str  # effect, title: its name, and in words
     title: Text
     parameter: str  # parameter, unit: its (first) parameter
@@ -284,8 +280,6 @@ def smallest_effects(result: SearchResult, alpha: float, model: RecordingModel) 
 
 @dataclass(frozen=True, eq=False)
 class _Signal:
-    """What an effect shows, for a coefficient as large as its prior standard deviation."""
-
     index: int
     effect: Effect
     raw: Floats  # (m,) the whole. Of an effect with a nonlinear parameter it is the typical one

@@ -53,12 +53,10 @@ def against_repeats(model: RecordingModel) -> RepeatComparison | None:
 
 
 def exceeds(repeats: RepeatComparison | None, alpha: float) -> bool:
-    """Whether repeats share more than noise that is independent from reading to reading would leave."""
     return repeats is not None and repeats.p_value < alpha
 
 
 def verdict_of(*, named: bool, doubtful: bool, modelled: bool) -> str:
-    """Of a recording that contradicts its model: effects are named, and whether in full; or a function predicts it."""
     if named:
         return "partial" if doubtful else "explained"
     return "empirical" if modelled else "unexplained"

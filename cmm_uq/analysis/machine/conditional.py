@@ -21,20 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from cmm_uq.analysis.machine.recordings import (
-    ALONE,
-    NO_DOUBT,
-    FurtherRecording,
-    FurtherRecordings,
-    components_of,
-    doubted,
-    mean_noise,
-    model_of_machine,
-    recorded,
-    sd_of,
-    shown_by,
-    stacked,
-)
+from cmm_uq.analysis.machine import recordings
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
@@ -90,7 +77,7 @@ class RecordedField:
     @classmethod
     def of(
         cls, model: RecordingModel, further: Sequence[Unmodelled], *, learned: bool = True,
-        beside: Sequence[FurtherRecording] = (), in_doubt: Floats | None = None,
+        beside: Sequence[recordings.FurtherRecording] = (), in_doubt: Floats | None = None,
     ) -> RecordedField:  # fmt: skip
         """Of a calibration and of what it left out; what needs columns that were not recorded takes no part.
 
@@ -98,24 +85,25 @@ class RecordedField:
         recordings of the machine. ``in_doubt``: (m, c) of the calibration's observations for what is stated to be in doubt.
         """
         models = (model, *(one.model for one in beside))
-        which = tuple(i for i, one in enumerate(further) if any(recorded(each, one.effect) for each in models))
+        which = tuple(
+            i for i, one in enumerate(further) if any(recordings.recorded(each, one.effect) for each in models)
+        )
         # where the artefact stands, not what was read: noise of readings would explain itself
         points = [each.artefact.points.at(each.where(each.estimate().about)) for each in models]
         errors = [_errors(models, further[i].effect, points, learned) for i in which]
-        whole = FieldModel(*stacked(model, beside), (*errors, *_own(models, beside, in_doubt)))
+        whole = FieldModel(*recordings.stacked(model, beside), (*errors, *_own(models, beside, in_doubt)))
         effects, sds = list[Effect](), [np.zeros(0)]
         for i, one in zip(which, errors, strict=True):
             effect = further[i].effect
-            sds.append(sd_of(linear(effect)))
+            sds.append(recordings.sd_of(linear(effect)))
             if one.impulse is not None and isinstance(effect, PeriodicScale):
                 seen = whole.shown(one.impulse)
                 sds.append(np.ones(len(seen)))
                 effects.append(GivenPeriod(effect, _readings(points, effect), seen.T))
             else:
                 effects.append(effect)
-        return cls(
-            whole, sum(len(effect.coefficients) for effect in model.effects), which, tuple(effects), np.concatenate(sds)
-        )
+        modelled = sum(len(effect.coefficients) for effect in model.effects)
+        return cls(whole, modelled, which, tuple(effects), np.concatenate(sds))
 
     def coefficients(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
         """Exact draws (N, k + f) of the calibration's effects, then of what it left out, for N sizes of noise and families."""
@@ -132,19 +120,18 @@ def _readings(points: Iterable[Points], effect: PeriodicScale) -> Floats:
 def _errors(models: Sequence[RecordingModel], effect: Effect, points: Sequence[Points], learned: bool) -> FieldErrors:
     whole, family = linear(effect), family_of(effect) if learned else None
     if not isinstance(effect, PeriodicScale):
-        columns = np.vstack([shown_by(each, whole) for each in models]) * sd_of(whole)
+        columns = np.vstack([recordings.shown_by(each, whole) for each in models]) * recordings.sd_of(whole)
         return FieldErrors(family, columns, normal(columns.shape[1]))
     readings = _readings(points, effect)
     impulse = scipy.linalg.block_diag(*(shown(each, effect) for each in models))
     waves = np.vstack([whole.basis(each)[:, "xyz".index(effect.axis)] for each in points])
     beforehand = GivenPeriod(effect, readings, np.zeros((len(readings), 0))).beforehand
-    return FieldErrors(
-        family, impulse @ waves * sd_of(whole), beforehand, impulse, covariance(effect, readings, readings)
-    )
+    tied = covariance(effect, readings, readings)
+    return FieldErrors(family, impulse @ waves * recordings.sd_of(whole), beforehand, impulse, tied)
 
 
 def _own(
-    models: Sequence[RecordingModel], beside: Sequence[FurtherRecording], in_doubt: Floats | None
+    models: Sequence[RecordingModel], beside: Sequence[recordings.FurtherRecording], in_doubt: Floats | None
 ) -> Iterator[FieldErrors]:
     """What one recording has alone: doubt of the first; noise of a further one, and the machine's change between them."""
     ends = np.cumsum([int(each.used.sum()) for each in models])
@@ -158,34 +145,27 @@ def _own(
 
 
 def own_noise(
-    model: RecordingModel,
-    errors: Sequence[Unmodelled],
-    seed: int = 0,
-    known: Sizes | None = None,
-    beside: Sequence[FurtherRecording] = (),
-) -> Floats:
+    model: RecordingModel, errors: Sequence[Unmodelled], seed: int = 0, known: Sizes | None = None,
+    beside: Sequence[recordings.FurtherRecording] = (),
+) -> Floats:  # fmt: skip
     """(m, m) factor of the mean covariance, mm, of a recording's noise, all of the machine's errors and others beside it."""
     whole = RecordedField.of(model, errors, beside=beside)
-    return mean_noise(components_of(model), known or _sizes(whole, model, HELD, seed, None).noise)
+    return recordings.mean_noise(recordings.components_of(model), known or _sizes(whole, model, HELD, seed, None).noise)
 
 
 def further_recording(
-    first: FurtherRecording,
-    other: RecordingModel,
-    errors: Sequence[Unmodelled],
-    seed: int = 0,
-    sigma_mm: float | None = None,
-    causes: Sequence[Cause] = (),
-) -> FurtherRecording:
+    first: recordings.FurtherRecording, other: RecordingModel, errors: Sequence[Unmodelled], seed: int = 0,
+    sigma_mm: float | None = None, causes: Sequence[Cause] = (),
+) -> recordings.FurtherRecording:  # fmt: skip
     """Another recording of the machine, its noise as it follows from both of them together, that of the first being known.
 
     ``other``: without the observations that its certificate set aside. ``errors``: that the calibration did not model.
     ``sigma_mm``: of one recorded coordinate, where the noise is known and white. ``causes``: of doubt about all its
     observations, which act on them together and, as that is not known, on each block by itself besides.
     """
-    model, known = model_of_machine(first.model, other), None if sigma_mm is None else white(sigma_mm)
+    model, known = recordings.model_of_machine(first.model, other), None if sigma_mm is None else white(sigma_mm)
     noise = own_noise(model, errors, seed, known, (first,))
-    return FurtherRecording(model, np.hstack([noise, doubted(model, causes)]))
+    return recordings.FurtherRecording(model, np.hstack([noise, recordings.doubted(model, causes)]))
 
 
 def stated_noise(model: RecordingModel, components: Components, sizes: Sizes) -> StatedNoise:
@@ -224,15 +204,9 @@ def white(sigma_mm: float) -> Sizes:
 
 
 def given_recording(
-    state: MachineState,
-    model: RecordingModel,
-    sigma_mm: float | None = None,
-    draws: int = DRAWS,
-    seed: int = 0,
-    doubt: Doubt = NO_DOUBT,
-    beside: FurtherRecordings = ALONE,
-    effort: Effort = USUAL,
-) -> MachineState:
+    state: MachineState, model: RecordingModel, sigma_mm: float | None = None, draws: int = DRAWS, seed: int = 0,
+    doubt: Doubt = recordings.NO_DOUBT, beside: recordings.FurtherRecordings = recordings.ALONE, effort: Effort = USUAL,
+) -> MachineState:  # fmt: skip
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
     ``state``: as its certificate states it, its effects in the model's order; the model may have others, as of its artefact.
@@ -269,7 +243,7 @@ def _sizes(
     if high <= _UNTOLD * low:
         return sizes
     estimate = model.estimate()
-    alone = sample_with_noise(estimate.linear, components_of(model), estimate.least_squares, seed).sizes
+    alone = sample_with_noise(estimate.linear, recordings.components_of(model), estimate.least_squares, seed).sizes
     some = np.linspace(0, len(alone.placing) - 1, HELD).astype(np.int64)[np.arange(draws) % HELD]
     return replace(sample_sizes(whole.field, draws, seed, alone.typical), noise=alone.at(some))
 
@@ -326,7 +300,7 @@ def as_recorded_allows(
     model: RecordingModel,
     others: Sequence[Unmodelled],
     known: Sizes | None = None,
-    beside: Sequence[FurtherRecording] = (),
+    beside: Sequence[recordings.FurtherRecording] = (),
 ) -> tuple[tuple[Unmodelled, ...], tuple[StatementEvidence, ...]]:
     """Errors that were not modelled, without what the recording denies of what is stated of them; and what it says of each.
 
@@ -339,25 +313,27 @@ def as_recorded_allows(
         every |= {one.stated_by for one in chains}
         chains = [one.unstated for one in chains if one.unstated]
     while True:
-        told = {one.stated_by for one in held if one.unstated and any(recorded(each, one.effect) for each in models)}
+        told = {
+            one.stated_by
+            for one in held
+            if one.unstated and any(recordings.recorded(each, one.effect) for each in models)
+        }
         left = sorted(name for name in told if not (name in found and found[name].denied))
         if not left:
             break
-        alone, sets = (
-            _evidence(model, held, known, beside),
-            [(name,) for name in left] + [tuple(left)] * (len(left) > 1),
-        )
+        alone = _evidence(model, held, known, beside)
+        sets = [(name,) for name in left] + [tuple(left)] * (len(left) > 1)
         logs = {some: _evidence(model, _without(held, some), known, beside) - alone for some in sets}
-        found |= {
-            some[0]: StatementEvidence(some[0], float(np.exp(min(logs[some], _MOST_LOG))))
-            for some in sets
-            if len(some) == 1
+        said = {
+            some: {name: StatementEvidence(name, float(np.exp(min(log, _MOST_LOG)))) for name in some}
+            for some, log in logs.items()
         }
+        for name in left:
+            found |= said[name,]
         worst = max(sets, key=lambda some: logs[some])
-        denied = {name: StatementEvidence(name, float(np.exp(min(logs[worst], _MOST_LOG)))) for name in worst}
-        if not any(one.denied for one in denied.values()):
+        if not any(one.denied for one in said[worst].values()):
             break
-        held, found = _without(held, worst), found | denied
+        held, found = _without(held, worst), found | said[worst]
     return held, tuple(found.get(name, StatementEvidence(name, np.nan)) for name in sorted(every))
 
 
@@ -366,6 +342,9 @@ def _without(others: Iterable[Unmodelled], statements: Collection[str]) -> tuple
 
 
 def _evidence(
-    model: RecordingModel, others: Sequence[Unmodelled], known: Sizes | None, beside: Sequence[FurtherRecording]
+    model: RecordingModel,
+    others: Sequence[Unmodelled],
+    known: Sizes | None,
+    beside: Sequence[recordings.FurtherRecording],
 ) -> float:
     return log_evidence(RecordedField.of(model, others, beside=beside).field, _EVIDENCE_SEED, known)

@@ -63,13 +63,9 @@ class FieldMap:
 
 
 def field_map(
-    model: RecordingModel,
-    posterior: NoisyPosterior,
-    doubt: Doubt,
-    observe: Observed,
-    seed: int,
+    model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int,
     beside: FurtherRecordings = ALONE,
-) -> FieldMap:
+) -> FieldMap:  # fmt: skip
     """Of the errors of a machine that follow from the place alone.
 
     ``model``: of a calibration, and its ``posterior`` with no other errors. ``doubt``: what is stated to be in doubt about
@@ -156,15 +152,13 @@ def _figures(effect: Effect, machine: Machine, blank: ErrorMap) -> Floats | None
     whole, tip = replace(machine, tip_on_every_carriage=True), np.array([60.0, 80.0, -130.0])
     true = effect.basis(_points(whole, places, tip))
     for i, each in enumerate(blank.axes):
-        found[start : start + 6 * len(each.positions)] = _of_carriage(effect, machine, i, each.positions).reshape(
-            -1, count
-        )
+        own = slice(start, start := start + 6 * len(each.positions))
+        found[own] = _of_carriage(effect, machine, i, each.positions).reshape(-1, count)
         tips = np.broadcast_to(tip, places.shape)
         carried = MapCovariance(found, np.zeros(3)).root(blank, places, tip=tips, chain=machine.chain)
         if np.abs(carried - true).max(initial=0.0) <= _EXACT * np.abs(true).max(initial=0.0):
             return found
         found[:] = 0.0
-        start += 6 * len(each.positions)
     return None
 
 
@@ -251,10 +245,9 @@ def _held_out(drawn: DrawnErrors, seed: int) -> HeldOutCorrection | None:
         spread = [draws @ columns.T, (draws - mean) @ columns.T]
         expected += [size * (float(np.mean(np.sum(each**2, axis=1))) + noise) for each in spread]
         count += len(off) - open_
-    uncorrected, named, corrected, *foreseen = np.sqrt(np.append(squares, expected) / max(count, 1)) / MICROMETRE
-    return HeldOutCorrection(
-        float(uncorrected), float(named), float(corrected), (float(foreseen[0]), float(foreseen[1])), unseen
-    )
+    each = (np.sqrt(np.append(squares, expected) / max(count, 1)) / MICROMETRE).tolist()
+    uncorrected, named, corrected, first, last = each
+    return HeldOutCorrection(uncorrected, named, corrected, (first, last), unseen)
 
 
 def _of_machine(linear: LinearModel, every: Floats, named: int, rest: NDArray[np.bool_], sigma: float) -> Floats:

@@ -43,8 +43,6 @@ _TAILS = [0.025, 0.5, 0.975]
 
 @dataclass(frozen=True, eq=False)
 class MachinePerformance:
-    """Errors of the recorded lengths by the machine alone."""
-
     points: Points
     rows: Ints  # (m, 2) the points between which each length lies
     errors: Floats  # (N, m) draws, µm
@@ -53,7 +51,6 @@ class MachinePerformance:
 
     @cached_property
     def figures(self) -> Mapping[str, Quantity]:
-        """The machine's own, by the names of the recorded ones."""
         if not self.of_bar:
             return {}
         drawn, of_mean = (accuracy.figures(MICROMETRE * errors) for errors in (self.errors, self.errors.mean(axis=0)))

@@ -32,8 +32,6 @@ _NO_NOISE = 1e-12  # part of the variance of a reading of the first recording th
 
 @dataclass(frozen=True, eq=False)
 class FurtherRecording:
-    """A recording of the same machine beside that of its calibration."""
-
     model: RecordingModel  # with the calibration's named errors of the machine, and those of its own artefact and probe
     noise: Floats  # (m, c) factor of the covariance, mm, of its noise and of what is in doubt of it
     # by effect and coefficient: root mean square change between the recordings, and what the machine corrected during this one
@@ -92,12 +90,9 @@ def doubted(model: RecordingModel, causes: Iterable[Cause]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class FurtherRecordings:
-    """What is taken together with the recording of a calibration."""
-
     recordings: tuple[FurtherRecording, ...] = ()
-    causes: Callable[[Artefact], Iterable[Cause]] = (
-        lambda artefact: ()
-    )  # of doubt about the calibration's own observations
+    # of doubt about the calibration's own observations
+    causes: Callable[[Artefact], Iterable[Cause]] = lambda artefact: ()
 
     def doubted(self, model: RecordingModel) -> Floats | None:
         """As of :func:`doubted`, where others bear on the same errors: else doubt widens what follows from one recording."""

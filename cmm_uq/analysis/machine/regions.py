@@ -54,11 +54,10 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 def readings_of(machine: Machine) -> dict[str, AxisReading]:
     """By axis, of those of which it is stated how they are read."""
     q = float(np.sqrt(-2 * np.log(0.05)))
-    return {axis: AxisReading(facts, q * _allowed(axis)) for axis, facts in machine.read_by.items()}
-
-
-def _allowed(axis: str) -> float:
-    return PeriodicScale(axis).coefficients[0].prior_sd
+    return {
+        axis: AxisReading(facts, q * PeriodicScale(axis).coefficients[0].prior_sd)
+        for axis, facts in machine.read_by.items()
+    }
 
 
 def with_readings(others: Iterable[Unmodelled], machine: Machine) -> tuple[Unmodelled, ...]:
@@ -125,14 +124,9 @@ class DrawnErrors:
 
     @classmethod
     def of(
-        cls,
-        model: RecordingModel,
-        doubt: Doubt,
-        observe: Observed,
-        seed: int,
-        draws: int = DRAWS,
+        cls, model: RecordingModel, doubt: Doubt, observe: Observed, seed: int, draws: int = DRAWS,
         beside: FurtherRecordings = ALONE,
-    ) -> DrawnErrors:
+    ) -> DrawnErrors:  # fmt: skip
         """``doubt``: what is stated to be in doubt about the unknowns. ``beside``: what is taken together with the recording.
 
         Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
@@ -219,13 +213,9 @@ def other_errors(model: RecordingModel) -> list[Unmodelled]:
 
 
 def factor_regions(
-    model: RecordingModel,
-    posterior: NoisyPosterior,
-    doubt: Doubt,
-    observe: Observed,
-    seed: int,
+    model: RecordingModel, posterior: NoisyPosterior, doubt: Doubt, observe: Observed, seed: int,
     beside: FurtherRecordings = ALONE,
-) -> FactorRegions:
+) -> FactorRegions:  # fmt: skip
     """Of the named errors that need nothing but a place.
 
     ``posterior``: of the model with no other errors. ``doubt``: what is stated to be in doubt about its unknowns. ``beside``:
@@ -238,9 +228,8 @@ def factor_regions(
     field, sizes, own, further = drawn.field, drawn.sizes, drawn.own, drawn.further
 
     named, placed = columns_of(model.effects, _of_place), columns_of(field.effects, lambda one: not one.columns)
-    moved = partial(
-        _moved, model.artefact.points.machine, _chosen(model.effects, named), _chosen(field.effects, placed)
-    )
+    acting = _chosen(model.effects, named), _chosen(field.effects, placed)
+    moved = partial(_moved, model.artefact.points.machine, *acting)
     whole, *eighths = (moved(ends) for ends in (((0.0, 1.0),) * 3, *EIGHTHS))
     same = np.logical_and.reduce([np.all(np.isfinite(one), axis=1) for one in (whole, *eighths)])
     named = named[same]
@@ -265,13 +254,9 @@ def factor_regions(
         dict(zip(keys, quantities, strict=True)),
         {key: (float(low[i]), float(high[i])) for i, key in enumerate(keys) if str(units[i]) in _ANYWHERE},
         {key: Quantity.of_draws(recorded[:, i], of) for i, key, of in zip(named, keys, units, strict=True)},
-        disagreeing(model, posterior, recorded),
-        scales,
-        influence,
-        (int(drawn.model.used.sum()), int(model.used.sum())),
-        drawn.statements,
-        drawn.performance(model),
-    )
+        disagreeing(model, posterior, recorded), scales, influence,
+        (int(drawn.model.used.sum()), int(model.used.sum())), drawn.statements, drawn.performance(model),
+    )  # fmt: skip
 
 
 def _of_place(effect: Effect) -> bool:
@@ -286,7 +271,6 @@ def columns_of(effects: Sequence[Effect], which: Callable[[Effect], bool]) -> In
 
 
 def _chosen(effects: Sequence[Effect], columns: Ints) -> list[Effect]:
-    """The effects that these coefficients are of."""
     of = [one for one in effects for _ in one.coefficients]
     return list(dict.fromkeys(of[i] for i in columns))
 

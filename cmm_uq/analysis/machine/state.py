@@ -122,8 +122,6 @@ class StatedNoise:
 
 @dataclass(frozen=True, eq=False)
 class MachineState:
-    """What is known of a machine on the day that a part is measured."""
-
     machine: Machine  # its chain, travel and origin
     effects: tuple[Effect, ...]  # that the calibration modelled, in the order of their coefficients
     draws: Floats  # (M, k) of the coefficients together, in their units
@@ -257,15 +255,10 @@ def at_points(state: MachineState, columns: Container[str]) -> MachineState:
     kept = ~away[owner]
     sizes = [state.draws[:, owner == i].std(axis=0) for i in np.flatnonzero(away)]
     more = tuple(Unmodelled(effect, sd) for effect, sd in zip(lost, sizes, strict=True))
+    others = tuple(effect for effect in state.effects if effect not in lost)
     corrections = state.corrections[kept] if len(state.corrections) else state.corrections
-    return replace(
-        state,
-        effects=tuple(effect for effect in state.effects if effect not in lost),
-        draws=state.draws[:, kept],
-        drift=state.drift[kept],
-        corrections=corrections,
-        unmodelled=(*state.unmodelled, *more),
-    )
+    left = replace(state, effects=others, draws=state.draws[:, kept], drift=state.drift[kept], corrections=corrections)
+    return replace(left, unmodelled=(*state.unmodelled, *more))
 
 
 def with_curves(state: MachineState) -> MachineState:

@@ -29,8 +29,6 @@ VALUES = 8  # numbers that a feature is told by: position (3), direction (3), di
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """A feature of N measurements, in the frame of the points."""
-
     values: Floats  # (N, 8) position, direction, diameter, half angle; zero where there is none
     # (N,) form deviation, mm; (0,) where it was not asked for
     form: Floats = field(default_factory=lambda: np.zeros(0))
@@ -112,9 +110,8 @@ class ProbedFeature:
         if with_points:
             points = self.points + (displacements[:, :, None] * normals if raised else displacements)
         if raised:
-            drawn = self._associated(
-                Raised(displacements, self._in_own_plane(normals), self._in_own_plane(self._offset))
-            )
+            local = Raised(displacements, self._in_own_plane(normals), self._in_own_plane(self._offset))
+            drawn = self._associated(local)
             mean = self._offset.mean(axis=0) + displacements @ normals / self.n
             return Features(self._slid(self._values(drawn), mean), drawn.form, points)
         if self.feature.kind == "point":
@@ -200,10 +197,8 @@ class ProbedFeature:
     def derivative(self) -> Floats:
         """(8, n, 3) of the values by the coordinates of each point."""
         if self.feature.kind == "point" or self.feature.members or self.n <= MANY:
-            found = []
-            for unit in one_by_one(self.n, 3):
-                step = _STEP * unit
-                found.append((self.values(step) - self.values(-step)) / (2 * _STEP))
+            steps = [_STEP * unit for unit in one_by_one(self.n, 3)]
+            found = [(self.values(step) - self.values(-step)) / (2 * _STEP) for step in steps]
             return np.concatenate(found).T.reshape(VALUES, self.n, 3)
         states, followed = self._repeated.followed(self._in_own_plane(self._offset), _STEP)
         up, down = np.split(self._slid(self._values(self._repeated.drawn(states)), self._offset.mean(axis=0)), 2)
@@ -216,7 +211,6 @@ class ProbedFeature:
 
     @property
     def undisturbed(self) -> Features:
-        """The feature without any draw."""
         return Features(self.base[None])
 
     def to_first_order(self, change: Floats) -> Features:

@@ -46,9 +46,14 @@ _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 # the plan with twice the points in every feature, and its circumstances
 Doubled = Callable[[], tuple[Plan, MeasurementConditions]]
 KINDS: Mapping[Kind, Text] = {
-    "point": say("point"), "line": say("line"), "plane": say("plane"), "circle": say("circle"), "sphere": say("sphere"),
-    "cylinder": say("cylinder"), "cone": say("cone"),
-}  # fmt: skip
+    "point": say("point"),
+    "line": say("line"),
+    "plane": say("plane"),
+    "circle": say("circle"),
+    "sphere": say("sphere"),
+    "cylinder": say("cylinder"),
+    "cone": say("cone"),
+}
 CHARACTERISTICS: Mapping[str, Text] = {
     "size": say("diameter"), "straightness": say("straightness"), "flatness": say("flatness"),
     "roundness": say("roundness"), "cylindricity": say("cylindricity"), "sphericity": say("sphericity"),
@@ -261,8 +266,6 @@ def _rigid(points: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A way to measure, and what comes of it."""
-
     name: Text  # of the way
     u: Floats  # (c,) standard uncertainties, mm and rad
     draws: int  # that they are from
@@ -343,8 +346,10 @@ def _changes(
     yield say("each point four times"), lambda: (plan, replace(given, repeats=4 * given.repeats))
     if doubled is not None:
         yield say("twice the points in every feature"), doubled
-    styli = tuple(replace(s, u_diameter_um=0.5 * s.u_diameter_um, u_offset_um=0.5 * s.u_offset_um,
-                          lobing_um=0.5 * s.lobing_um) for s in plan.styli)  # fmt: skip
+    styli = tuple(
+        replace(s, u_diameter_um=0.5 * s.u_diameter_um, u_offset_um=0.5 * s.u_offset_um, lobing_um=0.5 * s.lobing_um)
+        for s in plan.styli
+    )
     yield say("styli qualified twice as well"), lambda: (replace(plan, styli=styli), given)
     part = given.surroundings.part
     steadier = replace(given.surroundings, part=replace(part, u_temperature_k=0.5 * part.u_temperature_k))

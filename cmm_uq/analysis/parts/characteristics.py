@@ -36,16 +36,12 @@ _FEWEST_IN_SECTION = 3  # points by which a section shows any runout beyond wher
 
 @dataclass(frozen=True, eq=False)
 class MeasuredFeatures:
-    """Features and frames of N virtual measurements."""
-
     features: Mapping[Key, Features]  # by name and association
     frames: Mapping[tuple[str, ...], PartFrame]  # of the part, by names of datums
 
 
 @dataclass(frozen=True, eq=False)
 class CharacteristicEvaluation:
-    """How one characteristic follows from features."""
-
     characteristic: PartCharacteristic
     plan: Plan  # in which it is
     nominal: Mapping[str, Features]  # values of its features, without errors, by name
@@ -57,11 +53,11 @@ class CharacteristicEvaluation:
         kinds = [plan.feature(name).kind for name in one.features]
         counts = (1, 2) if asks.alone else (asks.features,)
         if len(kinds) not in counts:
-            several = " or ".join(map(str, counts))
-            raise CmmUqError(f"{one.what} is of {several} features, not {len(kinds)}", where=where)
-        fitting = (
-            asks.alone if len(kinds) < asks.features else (*asks.kinds, *(("cone",) if one.what == "size" else ()))
-        )
+            raise CmmUqError(
+                f"{one.what} is of {' or '.join(map(str, counts))} features, not {len(kinds)}", where=where
+            )
+        several = "cone" if one.what == "size" else None
+        fitting = asks.alone if len(kinds) < asks.features else (*asks.kinds, *filter(None, [several]))
         anywhere = asks.framed or one.what == "coaxiality"  # what has a place has these, here
         for kind in kinds:
             if kind not in fitting and not anywhere:
@@ -82,7 +78,6 @@ class CharacteristicEvaluation:
 
     @property
     def datums(self) -> tuple[Key, ...]:
-        """Features of its datums."""
         names = self.frame_of or self.characteristic.datums
         return () if names == BEST_FIT else tuple((name, self.plan.feature(name).association) for name in names)
 
@@ -112,7 +107,6 @@ class CharacteristicEvaluation:
 
     @cached_property
     def feature(self) -> PartFeature:
-        """Its first feature, as planned."""
         return self.plan.feature(self.characteristic.features[0])
 
     def place(self, name: str, measured: Features) -> Floats:
@@ -152,9 +146,11 @@ class CharacteristicEvaluation:
     def refuse_unfit(self) -> None:
         """Refuse what only the nominal points show."""
         if self.characteristic.what in RUNOUTS and not self.sections:
-            raise CmmUqError(f"no section of {self.feature.name!r} has {_FEWEST_IN_SECTION} points",
-                             where=f"characteristic {self.characteristic.name!r}",
-                             fix="Probe it in circles about the datum's axis, or ask for total runout")  # fmt: skip
+            raise CmmUqError(
+                f"no section of {self.feature.name!r} has {_FEWEST_IN_SECTION} points",
+                where=f"characteristic {self.characteristic.name!r}",
+                fix="Probe it in circles about the datum's axis, or ask for total runout",
+            )
 
     @cached_property
     def across(self) -> Repeated:

@@ -111,9 +111,7 @@ class DatumSystem:
     """
 
     def __init__(self, features: Sequence[PartFeature], nominal: Sequence[Features]) -> None:
-        self.features = tuple(
-            each for one in features for each in (map(as_datum, one.members) if one.members else (one,))
-        )
+        self.features = tuple(each for one in features for each in tuple(map(as_datum, one.members)) or (one,))
         self.nominal = _members(nominal)
         self._first: int | None = None
         self._second: tuple[int, int | None] = 0, None

@@ -101,10 +101,16 @@ class Evaluator:
         feature = self.plan.feature(name)
         first, key = (name, EXACT, feature.points.tobytes()), (name, how, points.tobytes())
         if first not in self._known:
-            self._known[first] = _of(feature, feature.points, EXACT)
+            self._known[first] = self._made(feature, feature.points, EXACT)
         if key not in self._known:
-            self._known[key] = _of(feature, points, how, self._known[first])
+            self._known[key] = self._made(feature, points, how, self._known[first])
         return self._known[key]
+
+    @staticmethod
+    def _made(
+        feature: PartFeature, points: Floats, how: Association, looked_at: ProbedFeature | None = None
+    ) -> ProbedFeature:
+        return ProbedCommon(feature, points) if feature.members else ProbedFeature(feature, points, how, looked_at)
 
     @cached_property
     def transfers(self) -> list[Floats | None]:
@@ -208,12 +214,6 @@ class Evaluator:
             followed = follow(drawn.table)
             self._followed[key] = drawn.table, followed
         return np.asarray(followed[drawn.rows])
-
-
-def _of(
-    feature: PartFeature, points: Floats, how: Association, looked_at: ProbedFeature | None = None
-) -> ProbedFeature:
-    return ProbedCommon(feature, points) if feature.members else ProbedFeature(feature, points, how, looked_at)
 
 
 def characteristics_of(plan: Plan, points: Floats, known: Known | None = None) -> Floats:

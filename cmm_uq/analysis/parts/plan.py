@@ -40,8 +40,6 @@ OWN_COLUMNS = tuple(
 
 @dataclass(frozen=True, eq=False)
 class Stylus:
-    """A stylus as it is used, with what its qualification left uncertain, as standard uncertainties."""
-
     name: str  # as features name it
     # (3,) centre of the tip from the ram's reference point, machine axes: x, y, z
     offset_mm: Floats = field(default_factory=lambda: np.zeros(3))
@@ -58,8 +56,6 @@ class Stylus:
 
 @dataclass(frozen=True, eq=False)
 class Nominal:
-    """Where a feature is meant to be."""
-
     point: Floats  # (3,) on it: the centre, or a point of plane, line or axis
     # (3,) unit vector along line or axis, normal of plane or circle; none of point and sphere
     direction: Floats | None = None
@@ -155,8 +151,6 @@ class PartAlignment:
 
 @dataclass(frozen=True)
 class PartCharacteristic:
-    """What the drawing asks for."""
-
     name: str  # as on the drawing
     what: What
     features: tuple[str, ...]  # names of the features that it is of, in order
@@ -243,7 +237,6 @@ class Plan:
         return np.concatenate([np.arange(each.start, each.stop) for each in rows])
 
     def members(self, name: str) -> tuple[str, ...]:
-        """Names of the members of a common datum; of a feature its own."""
         return next((datum.features for datum in self.common if datum.name == name), (name,))
 
     def feature(self, name: str) -> PartFeature:
@@ -359,8 +352,10 @@ def placed(plan: Plan, pose: PartPose, machine: Machine, columns: Mapping[str, F
         feature = next(name for name, rows in plan.rows.items() if rows.start <= row < rows.stop)
         raise CmmUqError(
             f"{AXES[axis].upper()} would have to read {points.carriages[row, axis]:.1f} mm at feature {feature!r}, "
-            f"beyond its travel of {low:g} to {high:g} mm", where="placing", fix="Move the part, or take another stylus",
-        )  # fmt: skip
+            f"beyond its travel of {low:g} to {high:g} mm",
+            where="placing",
+            fix="Move the part, or take another stylus",
+        )
     return points
 
 

@@ -13,6 +13,7 @@ point to one.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,8 +38,6 @@ _TURNED = ("cylinder", "plane")  # of these, those whose place says nothing with
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """A job with what was measured of it."""
-
     job: PartJob  # without characteristics of which the report says nothing
     values: Floats | None  # (c,) mm and rad; ``None`` where nothing was measured
     warnings: tuple[Text, ...] = ()
@@ -81,85 +80,64 @@ def measured_of(job: PartJob) -> Measured:
     return Measured(settled, np.array(values), tuple(_warnings(given, derived, left, zones=bool(zones))))
 
 
-def _warnings(given: Reported, derived: list[str], left: list[str], *, zones: bool) -> list[Text]:
-    found: list[Text] = [
-        say(
-            "Values are those of the report {file} ({program}): nobody evaluated them from points here. By which association "
-            "and filter they were found, and what form the points showed, is not known; the uncertainty is that of the plan "
-            "about the nominal part, evaluated as this job asks.",
-            file=Verbatim(given.file),
-            program=given.program,
-        )
-    ]
+def _warnings(given: Reported, derived: list[str], left: list[str], *, zones: bool) -> Iterator[Text]:
+    yield say(
+        "Values are those of the report {file} ({program}): nobody evaluated them from points here. By which association "
+        "and filter they were found, and what form the points showed, is not known; the uncertainty is that of the plan "
+        "about the nominal part, evaluated as this job asks.",
+        file=Verbatim(given.file),
+        program=given.program,
+    )
     if zones:
-        found.append(
-            say(
-                "Of a form, orientation, location or runout a value does not say to which side the part deviates: it is not "
-                "corrected for the mean error, and its U is as large as errors can make it on any part."
-            )
+        yield say(
+            "Of a form, orientation, location or runout a value does not say to which side the part deviates: it is not "
+            "corrected for the mean error, and its U is as large as errors can make it on any part."
         )
     if derived:
-        found.append(
-            say(
-                "By the features of the report, exactly, in the frame of the alignment; it does not state them "
-                "themselves: {names}.",
-                names=commas(names(derived)),
-            )
+        yield say(
+            "By the features of the report, exactly, in the frame of the alignment; it does not state them "
+            "themselves: {names}.",
+            names=commas(names(derived)),
         )
     if left:
-        found.append(say("Not in the report, and so not measured: {names}.", names=commas(names(left))))
-    return found
+        yield say("Not in the report, and so not measured: {names}.", names=commas(names(left)))
 
 
 def _refuse_whole_surfaces(job: PartJob, plan: Plan) -> None:
     drawn = {one.name for one in plan.features if len(one.surface)}
     for one, zone in zip(plan.characteristics, never_negative(plan), strict=True):
         if zone and drawn.intersection(one.features):
-            raise CmmUqError(
-                f"{one.name!r} is a zone of which the report says no more than its width, and surface_points "
-                "ask for a form that is true",
-                where=f"{job.folder / 'job.toml'}: [form] surface_points",
-                fix="Leave surface_points out: all form is then an error of the measurement",
-            )
+            problem = f"{one.name!r} is a zone of which the report says no more than its width, and surface_points "
+            problem += "ask for a form that is true"
+            fix = "Leave surface_points out: all form is then an error of the measurement"
+            raise CmmUqError(problem, where=f"{job.folder / 'job.toml'}: [form] surface_points", fix=fix)
 
 
 def _refuse_nothing(job: PartJob, left: list[str]) -> None:
     where = str(job.folder / "job.toml")
     if len(left) == len(job.facts.characteristic):
-        raise CmmUqError(
-            "asks for nothing that the report says",
-            where=where,
-            fix='Name values by reported_as = "…", or give [recording] file with points',
-        )
+        fix = 'Name values by reported_as = "…", or give [recording] file with points'
+        raise CmmUqError("asks for nothing that the report says", where=where, fix=fix)
     calibrated = job.facts.by_calibrated_part
     for one in [] if calibrated is None else calibrated.characteristic:
         if one.name in left:
-            raise CmmUqError(
-                f"{one.name!r} is not in the report",
-                where=f"{where}: [by_calibrated_part]",
-                fix="Give its value in the report, or leave it out here",
-            )
+            fix = "Give its value in the report, or leave it out here"
+            raise CmmUqError(f"{one.name!r} is not in the report", where=f"{where}: [by_calibrated_part]", fix=fix)
 
 
 def _refuse_far(one: PartCharacteristic, value: float, nominal: float, where: str) -> None:
     """``value``, ``nominal``: mm or degrees."""
     angle, zone = one.what == "angle", ASKS[one.what].limits == "zone"
     if zone and value < 0:
-        raise CmmUqError(
-            f"{value:g} mm is no width of a zone, which is never negative",
-            where=where,
-            fix="Give the width, not a deviation from it",
-        )
+        problem = f"{value:g} mm is no width of a zone, which is never negative"
+        raise CmmUqError(problem, where=where, fix="Give the width, not a deviation from it")
     if abs(value - nominal) <= (_FAR_DEG if angle else FAR_MM):
         return
     unit = "°" if angle else " mm"
     other = None if angle or zone or not nominal else in_another_unit(value / nominal)
-    raise CmmUqError(
-        f"{value:.6g}{unit} is not {one.name!r}, which is {nominal:.6g}{unit} by its nominals"
-        + (f": as if it were {other}" if other else ""),
-        where=where,
-        fix="Give the actual value, not a deviation, in mm or degrees; or name the right one by reported_as",
-    )
+    problem = f"{value:.6g}{unit} is not {one.name!r}, which is {nominal:.6g}{unit} by its nominals"
+    fix = "Give the actual value, not a deviation, in mm or degrees; or name the right one by reported_as"
+    raise CmmUqError(problem + (f": as if it were {other}" if other else ""), where=where, fix=fix)
 
 
 def _follows(one: PartCharacteristic, plan: Plan, given: Reported) -> bool:
@@ -189,11 +167,8 @@ def _stated(given: Reported, feature: PartFeature) -> ReportedFeature:
 def _located(given: Reported, feature: PartFeature) -> bool:
     """Whether the report says where a feature is, and how it is turned where that matters."""
     said = _stated(given, feature)
-    return (
-        feature.kind in _SHAPED
-        and said.point is not None
-        and (feature.kind not in _TURNED or said.direction is not None)
-    )
+    turned = feature.kind not in _TURNED or said.direction is not None
+    return feature.kind in _SHAPED and said.point is not None and turned
 
 
 def _points(feature: PartFeature, said: ReportedFeature | None, job: PartJob) -> Floats:
@@ -210,20 +185,13 @@ def _points(feature: PartFeature, said: ReportedFeature | None, job: PartJob) ->
         apart = nominal.point - at
         at = at + (apart @ axis) * axis if feature.kind == "cylinder" else nominal.point - (apart @ axis) * axis
     if (away := float(np.linalg.norm(at - nominal.point))) > FAR_MM:
-        raise CmmUqError(
-            f"{feature.name!r} lies {away:.4g} mm from where it is planned",
-            where=said.where,
-            fix="Report it in the frame of the part's alignment",
-        )
+        problem = f"{feature.name!r} lies {away:.4g} mm from where it is planned"
+        raise CmmUqError(problem, where=said.where, fix="Report it in the frame of the part's alignment")
     about = feature.points - nominal.point
     if nominal.diameter_mm is not None and said.diameter_mm is not None:
         if abs(said.diameter_mm - nominal.diameter_mm) > FAR_MM:
-            raise CmmUqError(
-                f"{feature.name!r} has a diameter of {said.diameter_mm:.6g} mm, and by its nominal of "
-                f"{nominal.diameter_mm:.6g} mm",
-                where=said.where,
-                fix="Give diameters, in mm",
-            )
+            problem = f"{feature.name!r} has a diameter of {said.diameter_mm:.6g} mm, and by its nominal of "
+            raise CmmUqError(f"{problem}{nominal.diameter_mm:.6g} mm", where=said.where, fix="Give diameters, in mm")
         across = about if along is None or feature.kind == "sphere" else about - np.outer(about @ along, along)
         about = about + (said.diameter_mm / nominal.diameter_mm - 1) * across
     return np.asarray(at + about @ turn.T)

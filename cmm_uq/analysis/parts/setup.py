@@ -99,9 +99,11 @@ def refuse_unfit(job: PartJob) -> None:
         limits = [limit for limit in (one.lower, one.upper) if limit is not None]
         if one.what == "distance" and limits and max(map(abs, limits)) < value - max(map(abs, limits)):
             said = " to ".join(f"{limit:g}" for limit in limits)
-            raise CmmUqError(f"limits of {said} mm, where the distance is {value:.6g} mm by the nominals",
-                             where=f"{path}: [[characteristic]] {one.name}",
-                             fix="Give limits of the distance itself, not deviations from it")  # fmt: skip
+            raise CmmUqError(
+                f"limits of {said} mm, where the distance is {value:.6g} mm by the nominals",
+                where=f"{path}: [[characteristic]] {one.name}",
+                fix="Give limits of the distance itself, not deviations from it",
+            )
 
 
 def refuse_out_of_reach(job: PartJob, machine: Machine) -> None:
@@ -172,9 +174,9 @@ def forms_of(job: PartJob) -> tuple[SurfaceForm, ...]:
         given = one.facts.form or job.facts.form
         lobed = one.facts.kind in ("circle", "cylinder", "cone")
         harmonics = tuple((int(count), size) for count, size in given.harmonics_um.items()) if lobed else ()
-        form = SurfaceForm(one.facts.name, harmonics, given.field_um, given.correlation_mm, given.roughness_um)
-        if form.field_um or form.harmonics_um or form.roughness_um:
-            found.append(form)
+        if given.field_um or harmonics or given.roughness_um:
+            form = harmonics, given.field_um, given.correlation_mm, given.roughness_um
+            found.append(SurfaceForm(one.facts.name, *form))
     return tuple(found)
 
 
@@ -225,8 +227,10 @@ def outline(feature: PartFeature, view: Floats) -> list[Floats]:
     size = float(np.linalg.norm(across))
     if size < _ALONG:
         return rings
-    sides = [np.array([end + sign * radius * across / size for end, radius in zip(ends, radii, strict=True)])
-             for sign in (-1.0, 1.0)]  # fmt: skip
+    sides = [
+        np.array([end + sign * radius * across / size for end, radius in zip(ends, radii, strict=True)])
+        for sign in (-1.0, 1.0)
+    ]
     return [*rings, *sides]
 
 

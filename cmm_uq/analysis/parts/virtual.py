@@ -60,8 +60,6 @@ _PilotBlock = Callable[[], tuple[Movement, Floats]]
 
 @dataclass(frozen=True, eq=False)
 class MeasurementConditions:
-    """How and where a part is measured."""
-
     machine: MachineState  # as its certificate states it
     poses: tuple[PartPose, ...] = (PartPose(),)  # where the part lies; several where nobody knows, each as likely
     surroundings: Surroundings = field(default_factory=Surroundings)
@@ -92,15 +90,12 @@ class AtPose:
         own, on_surface = forms(given.forms, plan)
         beside = None if given.measured is None else given.measured - plan.points
         machine, self.base = modelled(given.machine, qualified, pose, beside)
+        first = int(plan.order[0]) if len(plan.order) else 0
+        readings = noise(given.machine, points, pose, given.repeats, first)
+        warm = temperatures(surroundings, plan, points, pose)
         self.causes: list[PartCause] = [
-            machine,
-            *unmodelled,
-            *noise(given.machine, points, pose, given.repeats, int(plan.order[0]) if len(plan.order) else 0),
-            *styli(plan, pose),
-            *temperatures(surroundings, plan, points, pose),
-            *given.further,
-            *own,
-        ]
+            machine, *unmodelled, *readings, *styli(plan, pose), *warm, *given.further, *own,
+        ]  # fmt: skip
         self.base += mean_expansion(surroundings, plan, points, pose)
         self.pilot = max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
         self._inverses = dict[bool, dict[int, Inverse]]()
@@ -195,11 +190,15 @@ class AtPose:
     def _inverted(self, *, exact: bool) -> dict[int, Inverse]:
         """Of trial parts with zones of several widths, which may be what was measured with other errors (:func:`.alike`)."""
         perfect = self.measured.movement([*[None] * len(self.causes), -np.ones((1, 1))], exact=exact)
-        blocks = self._pilot_blocks(exact=exact)
-        of = self.measured.of
-        again = np.concatenate([of(moved, exact=exact) + beside for moved, beside in (make() for make in blocks)])
-        alone = np.concatenate(
-            [of(moved.plus(perfect), exact=exact) + beside for moved, beside in (make() for make in blocks)]
+        blocks, of = self._pilot_blocks(exact=exact), self.measured.of
+        again, alone = (
+            np.concatenate(
+                [
+                    of(moved.plus(more) if more else moved, exact=exact) + beside
+                    for moved, beside in (make() for make in blocks)
+                ]
+            )
+            for more in (None, perfect)
         )
         inferred = [i for i in self.inferred if np.ptp(alone[:, i]) > ROUNDING]
         nodes = {i: nodes_of(float(self.still[i]), alone[:, i]) for i in inferred}
@@ -279,7 +278,6 @@ class Virtual:
 
     @property
     def names(self) -> list[str]:
-        """Of the characteristics."""
         return [one.name for one in self.plan.characteristics]
 
     def errors(self, random: np.random.Generator, n: int) -> Floats:

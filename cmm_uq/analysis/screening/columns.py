@@ -14,8 +14,6 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points
 
 @dataclass(frozen=True)
 class Finding:
-    """Something odd in a recording."""
-
     # impossible, duplicate, repeated block, swapped, reversed, unit, sign, exchanged coordinates, shifted column, stuck
     # or outlier
     kind: str
@@ -68,8 +66,6 @@ WAYS = ((-1, say("down")), (1, say("up")))  # that a column slipped by a row, an
 
 @dataclass(frozen=True)
 class Bounds:
-    """Values that a column may have, and the units that others are mistaken in."""
-
     low: float
     high: float
     why: Text
@@ -86,9 +82,11 @@ class Bounds:
 
 
 _TEMPERATURE = Bounds(
-    -30.0, 55.0, say("no measuring room is so cold or hot; is it in °C?"),
+    -30.0,
+    55.0,
+    say("no measuring room is so cold or hot; is it in °C?"),
     ((say("kelvin"), 1.0, -273.15), (Verbatim("°F"), 5 / 9, -160 / 9), (say("thousandths of °C"), 1e-3, 0.0)),
-)  # fmt: skip
+)
 
 # What each column may hold
 BOUNDS: Mapping[str, Bounds] = {
@@ -108,7 +106,6 @@ SENSORS = (*BOUNDS, "time_s")  # columns that are left out where they cannot be 
 
 
 def column_findings(points: Points, *, balls: bool) -> list[Finding]:
-    """All that is odd beside the coordinates, a finding a column."""
     of_values, of_time = (*_impossible(points), *_fraction(points)), _time(points, balls)
     return [*of_values, *of_time, *_stuck(points), *_slipped(points), *_approach(points)]
 
@@ -186,8 +183,10 @@ def _stuck(points: Points) -> Iterator[Finding]:
             why = say(
                 "{column} is stuck at {values:g} in {at_lines}, where it changed from placing to placing "
                 "before or after: look at the sensor",
-                column=Verbatim(column), values=values[rows[0]], at_lines=at_lines(points, rows),
-            )  # fmt: skip
+                column=Verbatim(column),
+                values=values[rows[0]],
+                at_lines=at_lines(points, rows),
+            )
             yield finding("stuck", points, rows, why, column)
 
 
@@ -203,8 +202,9 @@ def _slipped(points: Points) -> Iterator[Finding]:
             why = say(
                 "{column} changes inside every placing and would be the same for all points of each if it "
                 "were moved back: it is shifted {ways} by one row against the other columns: move it back",
-                column=Verbatim(column), ways=alternatives(ways),
-            )  # fmt: skip
+                column=Verbatim(column),
+                ways=alternatives(ways),
+            )
             yield finding("shifted column", points, _every(points), why, column)
 
 

@@ -33,8 +33,6 @@ _ABSURD = (1.0, 2e4)  # mm; a bar shorter or longer than this is in another unit
 
 @dataclass(frozen=True, eq=False)
 class Damage:
-    """What happened to some rows, and all coordinates and references without it, where that is known."""
-
     kind: str
     rows: Ints
     why: Text
@@ -310,7 +308,9 @@ def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:
         why = say(
             "{at_lines}: balls 1 and 2 of measurement {number} are exchanged against its other repeats. "
             "The length does not show it; what was recorded beside each ball (approach, temperatures) "
-            "may be exchanged too", at_lines=at_lines(points, rows), number=number,
-        )  # fmt: skip
+            "may be exchanged too",
+            at_lines=at_lines(points, rows),
+            number=number,
+        )
         found.append(finding("swapped", points, rows, why))
     return found

@@ -56,7 +56,6 @@ def screen_recording(
     points: Points, facts: ArtefactFacts, screening: Screening | None, observe: Observe, *, needed: Collection[str],
     set_aside: Collection[int], where: str,
 ) -> ScreenedRecording:  # fmt: skip
-    """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it."""
     shape = screening.shape_of(facts, points) if screening else None
     made = partial(observe, facts, where=where)
     damaged = coordinate_findings(points, shape, made, set_aside, where) if shape else []
@@ -160,8 +159,10 @@ def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     if len(run) == 1:
         why = say(
             "measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement, and "
-            "counts once", b=first, a=original,
-        )  # fmt: skip
+            "counts once",
+            b=first,
+            a=original,
+        )
         return replace(finding("duplicate", points, both, why), measurements=(original, first))
     block = say(
         "measurements {first} to {last} repeat the coordinates of measurements {original} to {final} to the last digit: a "

@@ -189,7 +189,6 @@ def common_length(xyz: Floats, rows: tuple[Ints, ...]) -> float:
 
 
 def spread(xyz: Floats) -> float:
-    """Diagonal, mm, of the box about some points."""
     return float(np.linalg.norm(np.ptp(xyz, axis=0)))
 
 
@@ -206,8 +205,6 @@ COORDINATES = tuple(f"{a}_mm" for a in AXES)
 
 @dataclass(frozen=True, eq=False)
 class Mistake:
-    """One mistake, and its undoing."""
-
     kind: str
     what: Text  # the mistake, as a sentence without its full stop
     fix: Text

@@ -118,12 +118,13 @@ _SHOWN = 60  # characters of a key or a value in a message
 
 def checked(
     content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]], context: object = None,
-    *, most_word: int = WORD.most, beside: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
+    *, most_word: int = WORD.most, most_listed: int = LISTED.most,
+    beside: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> Facts:  # fmt: skip
     """The contents of a TOML file as a checked object."""
     text = text_of(content, str(path))
     try:
-        data = toml_of(text, str(path), most_word=most_word)
+        data = toml_of(text, str(path), most_word=most_word, most_listed=most_listed)
     except tomllib.TOMLDecodeError as error:
         raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
                          fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip

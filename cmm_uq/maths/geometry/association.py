@@ -229,12 +229,9 @@ class Associated:
 
 
 def associate(
-    feature: FeatureKind,
-    points: ArrayLike,
-    association: Association = "least_squares",
-    *,
+    feature: FeatureKind, points: ArrayLike, association: Association = "least_squares", *,
     outward: ArrayLike | None = None,
-) -> Associated:
+) -> Associated:  # fmt: skip
     """The feature that the criterion asks for.
 
     ``points``: (n, 3) in mm; (n, 2) of a line or circle in a plane. Points of a circle in space are projected along the normal
@@ -253,8 +250,9 @@ def associate(
     if association == "tangent":
         return _tangent(feature, of, local, outward)
     if association in ("maximum_inscribed", "minimum_circumscribed") and of.shape not in SIZED:
-        raise CmmUqError(f"{feature}: it has no size to be inscribed or circumscribed",
-                         fix="Ask for circles, spheres and cylinders")  # fmt: skip
+        raise CmmUqError(
+            f"{feature}: it has no size to be inscribed or circumscribed", fix="Ask for circles, spheres and cylinders"
+        )
     if association == "least_squares":
         extreme = Extreme(of.state, np.zeros(0, dtype=np.int64), np.zeros(0), np.nan)
     else:
@@ -281,8 +279,10 @@ def _answer(
 def _tangent(feature: FeatureKind, of: Placed, local: Floats, outward: ArrayLike | None) -> Associated:
     """The side of the minimum zone that looks out of the material."""
     if of.shape not in STRAIGHT:
-        raise CmmUqError(f"{feature}: a tangent feature is a plane, or a line in a plane",
-                         fix="Ask for maximum_inscribed or minimum_circumscribed")  # fmt: skip
+        raise CmmUqError(
+            f"{feature}: a tangent feature is a plane, or a line in a plane",
+            fix="Ask for maximum_inscribed or minimum_circumscribed",
+        )
     if outward is None:
         problem = f"{feature}: a tangent needs the side of the material"
         raise CmmUqError(problem, fix="Give the direction out of it (outward)")

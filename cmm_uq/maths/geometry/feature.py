@@ -157,21 +157,14 @@ class Feature:
         return float(np.ptp(self.residuals))
 
     def u(self, name: str) -> float:
-        """Standard uncertainty of one parameter."""
         i = self.names.index(name)
         return float(np.sqrt(self.covariance[i, i]))
 
     @classmethod
     def of_minimum(
-        cls,
-        found: Minimum[Any],
-        extent: float,
-        names: str,
-        natural: Floats,
-        u_point: float | None,
-        components: int = 1,
-        **own: Any,
-    ) -> Self:
+        cls, found: Minimum[Any], extent: float, names: str, natural: Floats, u_point: float | None,
+        components: int = 1, **own: Any,
+    ) -> Self:  # fmt: skip
         """From a minimum in data whose unit is ``extent``, mm, and what only this feature has.
 
         ``natural``: (k, j) derivatives of the parameters ``names`` in mm and rad with respect to the step's j parameters.
@@ -187,19 +180,13 @@ class Feature:
             raise CmmUqError(f"{what}: so few points leave nothing to estimate their uncertainty from", fix=fix)
         u = float(np.sqrt(np.sum(distances**2) / freedom)) if u_point is None else float(u_point)
         return cls(
-            names=tuple(names.split()),
-            covariance=(u / extent) ** 2 * natural @ found.covariance() @ natural.T,
-            residuals=distances if components == 1 else distances.reshape(components, -1).T,
-            u_point=u,
-            u_point_given=u_point is not None,
-            degrees_of_freedom=freedom,
-            condition=found.condition,
-            iterations=found.iterations,
-            **own,
-        )
+            names=tuple(names.split()), covariance=(u / extent) ** 2 * natural @ found.covariance() @ natural.T,
+            residuals=distances if components == 1 else distances.reshape(components, -1).T, u_point=u,
+            u_point_given=u_point is not None, degrees_of_freedom=freedom, condition=found.condition,
+            iterations=found.iterations, **own,
+        )  # fmt: skip
 
     def correlation(self, one: str, other: str) -> float:
-        """Correlation coefficient of two parameters."""
         return float(self.covariance[self.names.index(one), self.names.index(other)] / (self.u(one) * self.u(other)))
 
 

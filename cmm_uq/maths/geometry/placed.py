@@ -26,8 +26,6 @@ Distances = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 @dataclass(frozen=True)
 class FeatureShape:
-    """A kind of feature in its own frame."""
-
     name: str  # as messages call it
     least: int  # points that determine it
     slopes: tuple[int, ...]  # places in the state of slopes of axis or normal; the others are mm

@@ -164,8 +164,10 @@ class Repeated:
         :class:`CmmUqError` for a feature without a size too, or points that hold no such one.
         """
         if self.placed.shape not in SIZED:
-            raise CmmUqError(f"{self.placed.shape.name}: it has no size to be inscribed or circumscribed",
-                             fix="Ask for circles, spheres and cylinders")  # fmt: skip
+            raise CmmUqError(
+                f"{self.placed.shape.name}: it has no size to be inscribed or circumscribed",
+                fix="Ask for circles, spheres and cylinders",
+            )
         errors, alone = self._checked(displacements), largest_inside if inscribed else circumscribed
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         begun = self._begun(errors)

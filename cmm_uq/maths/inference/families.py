@@ -51,8 +51,6 @@ _CLASSES = 60  # of observations alike in their noise; of more, a matrix a compo
 
 @dataclass(frozen=True)
 class Effort:
-    """How many draws of sizes are made."""
-
     each: int = 1000  # at once
     most: int = 24_000
     worth: float = 200.0  # independent draws that all are worth, with which that ends
@@ -67,8 +65,6 @@ FOLD = Effort(200, 8000, 60.0, 100, sampler=False, slopes=True)  # of one of man
 
 @dataclass(frozen=True, eq=False)
 class FieldErrors:
-    """Errors of one cause: j coefficients, normal beforehand with one standard deviation each."""
-
     family: str | None  # whose size they share; ``None`` where they have the size one
     columns: Floats  # (m, j) of the observations, mm, for one standard deviation of each at the size one
     draw: Drawn  # coefficients (N, j) beforehand, in standard deviations at the size one

@@ -40,8 +40,6 @@ _NEVER = -1e30
 
 @dataclass(frozen=True)
 class Numbers:
-    """The numbers that say the sizes of noise, and what they mean."""
-
     names: tuple[str, ...]  # as in :attr:`cmm_uq.maths.inference.noise.Components.names`, or but for the first.
 
     @cached_property
@@ -132,8 +130,6 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Present:
-    """What is proposed: probabilities of the sets of components, and distributions of what then matters."""
-
     numbers: Numbers  # what they mean
     probability: Floats  # (S,) of each set
     each: Sequence[Proposal]  # (S,) of the coordinates that matter in it

@@ -75,8 +75,6 @@ class BudgetLine:
 
 @dataclass(frozen=True)
 class Labels:
-    """Units of inputs and outputs, and origins of the inputs' figures, as a budget shows them."""
-
     units: Mapping[str, str] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
 
@@ -168,7 +166,6 @@ class Budget:
         return pd.DataFrame(rows)
 
     def as_text(self) -> list[tuple[Text, ...]]:
-        """Rows of text under :data:`HEADINGS`, for a page, nested lines included."""
         return [_text(depth, line, share) for depth, line, share in self.flat()]
 
 
@@ -183,17 +180,13 @@ def _text(depth: int, line: BudgetLine, share: float) -> tuple[Text, ...]:
     if line.value is not None and line.u is not None:
         value, u = rounded(line.value, line.u)
     return (
-        say("{indent}{name}", indent=Verbatim("\u2003" * depth), name=line.name),
-        value,
-        u,
-        NOTHING if line.unit == "1" else line.unit,
-        _DISTRIBUTIONS.get(line.distribution, NOTHING),
+        say("{indent}{name}", indent=Verbatim("\u2003" * depth), name=line.name), value, u,
+        NOTHING if line.unit == "1" else line.unit, _DISTRIBUTIONS.get(line.distribution, NOTHING),
         NOTHING if line.u is None else figure(line.dof, 3) if isfinite(line.dof) else Number("∞"),
         NOTHING if line.sensitivity is None else figure(line.sensitivity),
         Number(("−" if line.contribution < 0 else "") + significant(abs(line.contribution))),
-        say("{share} %", share=signed(100 * share, ".1f")),
-        line.origin,
-    )
+        say("{share} %", share=signed(100 * share, ".1f")), line.origin,
+    )  # fmt: skip
 
 
 _BELL_AND_LIMITS = (say("normal"), say("t"), say("rectangular"), say("rectangular uncertain"), say("trapezoidal"))
@@ -203,13 +196,9 @@ _DISTRIBUTIONS: Mapping[str, Text] = {name.replace(" ", "_"): name for name in (
 
 
 def budget_of(
-    model: MeasurementModel,
-    propagated: Propagated,
-    output: int = 0,
-    *,
-    labels: Labels | None = None,
+    model: MeasurementModel, propagated: Propagated, output: int = 0, *, labels: Labels | None = None,
     coverage: float = 0.95,
-) -> Budget:
+) -> Budget:  # fmt: skip
     """Budget of one output of a model propagated at a single point: inputs, correlations, terms of second order."""
     labels, name = labels or Labels(), propagated.outputs[output]
     slopes = propagated.sensitivity[output].tolist()

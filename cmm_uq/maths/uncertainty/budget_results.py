@@ -47,14 +47,11 @@ def _output(evaluation: Evaluation, row: int, stated: Stated) -> dict[str, Any]:
         of_row = {name: getattr(drawn, name)[row].tolist() for name in ("value", "u", "interval", "symmetric_interval")}
         simulated = {**of_row, **_data(drawn, "trials stable"), "tail_shape": _plain(float(drawn.shape[row]))}
     return {
-        **_data(stated, "value u dof interval coverage_factor"),
-        "unit": stated.budget.unit or None,
-        **_data(stated, "method reason"),
-        "first": _propagated(ways.first, row, coverage),
-        "second": _propagated(ways.second, row, coverage),
-        "monte_carlo": simulated if drawn else None,
+        **_data(stated, "value u dof interval coverage_factor"), "unit": stated.budget.unit or None,
+        **_data(stated, "method reason"), "first": _propagated(ways.first, row, coverage),
+        "second": _propagated(ways.second, row, coverage), "monte_carlo": simulated if drawn else None,
         "budget": _lines(stated.budget),
-    }
+    }  # fmt: skip
 
 
 def budget_data(budget: Budget) -> dict[str, Any]:

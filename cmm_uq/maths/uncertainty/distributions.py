@@ -235,14 +235,9 @@ def sampled(draws: Floats, together: str = "") -> Distribution:
 
 
 def _bounded(
-    kind: str,
-    low: Number,
-    high: Number,
-    dof: Number,
-    shape: DistributionShape | None,
-    variance: float,
+    kind: str, low: Number, high: Number, dof: Number, shape: DistributionShape | None, variance: float,
     **stated: Number,
-) -> Distribution:
+) -> Distribution:  # fmt: skip
     _limits(low, high, dof)
     mean, half_width = (np.asarray(low) + high) / 2, (np.asarray(high) - low) / 2
     u = half_width * np.sqrt(variance)

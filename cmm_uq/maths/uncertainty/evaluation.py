@@ -65,8 +65,6 @@ class Request:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Interval of the law of propagation against that of Monte Carlo, for one output."""
-
     low: float  # difference of the lower ends
     high: float  # difference of the upper ends
     tolerance: float  # δ

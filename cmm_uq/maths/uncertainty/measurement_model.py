@@ -51,35 +51,30 @@ LN2, LN10 = log(2.0), log(10.0)
 
 # f'(x) and f"(x)
 ONE: Mapping[np.ufunc, tuple[Partial, Rule]] = {
-    np.negative: (lambda _x, _f: -1.0, None),
-    np.positive: (lambda _x, _f: 1.0, None),
-    np.absolute: (lambda x, _f: sign(x), None),
-    np.square: (lambda x, _f: 2.0 * x, lambda _x, _f: 2.0),
+    np.negative: (lambda _x, _f: -1.0, None), np.positive: (lambda _x, _f: 1.0, None),
+    np.absolute: (lambda x, _f: sign(x), None), np.square: (lambda x, _f: 2.0 * x, lambda _x, _f: 2.0),
     np.reciprocal: (lambda _x, f: -f * f, lambda _x, f: 2.0 * f * f * f),
     np.sqrt: (lambda _x, f: 0.5 / f, lambda x, f: -0.25 / (f * x)),
     np.cbrt: (lambda _x, f: 1.0 / (3.0 * f * f), lambda x, f: -2.0 / (9.0 * f * f * x)),
-    np.exp: (lambda _x, f: f, lambda _x, f: f),
-    np.exp2: (lambda _x, f: LN2 * f, lambda _x, f: LN2 * LN2 * f),
+    np.exp: (lambda _x, f: f, lambda _x, f: f), np.exp2: (lambda _x, f: LN2 * f, lambda _x, f: LN2 * LN2 * f),
     np.expm1: (lambda _x, f: f + 1.0, lambda _x, f: f + 1.0),
     np.log: (lambda x, _f: 1.0 / x, lambda x, _f: -1.0 / (x * x)),
     np.log2: (lambda x, _f: 1.0 / (LN2 * x), lambda x, _f: -1.0 / (LN2 * x * x)),
     np.log10: (lambda x, _f: 1.0 / (LN10 * x), lambda x, _f: -1.0 / (LN10 * x * x)),
     np.log1p: (lambda x, _f: 1.0 / (1.0 + x), lambda x, _f: -1.0 / ((1.0 + x) * (1.0 + x))),
-    np.sin: (lambda x, _f: np.cos(x), lambda _x, f: -f),
-    np.cos: (lambda x, _f: -np.sin(x), lambda _x, f: -f),
+    np.sin: (lambda x, _f: np.cos(x), lambda _x, f: -f), np.cos: (lambda x, _f: -np.sin(x), lambda _x, f: -f),
     np.tan: (lambda _x, f: 1.0 + f * f, lambda _x, f: 2.0 * f * (1.0 + f * f)),
     np.arcsin: (lambda x, _f: 1.0 / np.sqrt(1.0 - x * x), lambda x, _f: x / (1.0 - x * x) ** 1.5),
     np.arccos: (lambda x, _f: -1.0 / np.sqrt(1.0 - x * x), lambda x, _f: -x / (1.0 - x * x) ** 1.5),
     np.arctan: (lambda x, _f: 1.0 / (1.0 + x * x), lambda x, _f: -2.0 * x / (1.0 + x * x) ** 2),
-    np.sinh: (lambda x, _f: np.cosh(x), lambda _x, f: f),
-    np.cosh: (lambda x, _f: np.sinh(x), lambda _x, f: f),
+    np.sinh: (lambda x, _f: np.cosh(x), lambda _x, f: f), np.cosh: (lambda x, _f: np.sinh(x), lambda _x, f: f),
     np.tanh: (lambda _x, f: 1.0 - f * f, lambda _x, f: -2.0 * f * (1.0 - f * f)),
     np.arcsinh: (lambda x, _f: 1.0 / np.sqrt(1.0 + x * x), lambda x, _f: -x / (1.0 + x * x) ** 1.5),
     np.arccosh: (lambda x, _f: 1.0 / np.sqrt(x * x - 1.0), lambda x, _f: -x / (x * x - 1.0) ** 1.5),
     np.arctanh: (lambda x, _f: 1.0 / (1.0 - x * x), lambda x, _f: 2.0 * x / (1.0 - x * x) ** 2),
     **dict.fromkeys((np.deg2rad, np.radians), (lambda _x, _f: np.pi / 180.0, None)),
     **dict.fromkeys((np.rad2deg, np.degrees), (lambda _x, _f: 180.0 / np.pi, None)),
-}
+}  # fmt: skip
 
 # by x, y, xx, xy, yy
 TWO: Mapping[np.ufunc, tuple[Partial, Partial, Rule, Rule, Rule]] = {

@@ -167,8 +167,6 @@ def _source(model: MeasurementModel | Source) -> Source:
 
 
 class _Run:
-    """Trials made so far, and what must be remembered of them."""
-
     def __init__(self, source: Source, coverage: float, seed: int) -> None:
         self.source, self.coverage, self.seed = source, coverage, seed
         self._rng = np.random.default_rng(seed)
@@ -247,8 +245,6 @@ class _Run:
 
 @dataclass(frozen=True, eq=False)
 class Propagated:
-    """Outputs of a measurement model by the law of propagation."""
-
     inputs: Sequence[str]  # m names
     outputs: Sequence[str]  # p names
     value: Floats  # (p, ...)

@@ -296,7 +296,7 @@ def test_a_laser_s_length_is_shortened_by_the_air(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (ready("length_at_21", WARM), "there is no ready model 'length_at_21'.*length_at_20"),
+        (ready("length_at_21", WARM), "length_at_21.*Did you mean 'length_at_20'"),
         (ready("length_at_20", {**WARM, "workpiece_k": (1.0, 0.1)}), "'workpiece_k' is no input of this model"),
         (ready("length_at_20", {"indicated_mm": (1.0, 0.1)}), "the input 'workpiece_c' is missing"),
         (ready("length_at_20", WARM, 'outputs = { y = "1" }\n'), "outputs is given, and the ready model has its own"),

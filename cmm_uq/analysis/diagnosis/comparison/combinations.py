@@ -47,9 +47,11 @@ class CombinationPrior:
     """
 
     def __init__(
-        self, explanations: Sequence[Explanation], counts: tuple[float, ...] = EFFECTS,
+        self,
+        explanations: Sequence[Explanation],
+        counts: tuple[float, ...] = EFFECTS,
         visible: Collection[int] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.counts, weights = counts, [e.weight for e in explanations]
         self._weight = [(e.kind, float(np.log(e.weight))) for e in explanations]
         together = [e.effect if e.together else None for e in explanations]
@@ -135,8 +137,6 @@ class Combination:
 
 @dataclass(frozen=True, eq=False)
 class Combinations:
-    """All combinations worth following."""
-
     explanations: Sequence[Explanation]
     by_key: Mapping[Key, Combination]  # by the indices of their explanations
     # probability, beforehand, of none, one, two … known effects that act by themselves
@@ -150,7 +150,6 @@ class Combinations:
         return dict(zip(self.by_key, np.exp(log - scipy.special.logsumexp(log)).tolist(), strict=True))
 
     def likeliest(self, keys: Iterable[Key]) -> Key:
-        """The most probable of some combinations."""
         return max(keys, key=lambda key: self.by_key[key].log_posterior)
 
     def effects_of(self, key: Key) -> Key:
@@ -224,9 +223,10 @@ def explore(
 def effects_of_every_machine(comparison: CandidateComparison) -> list[int]:
     """Effects that every machine has to some degree and this recording shows."""
     return [
-        i for i in sorted(comparison.visible)
+        i
+        for i in sorted(comparison.visible)
         if (effect := comparison.explanations[i].effect) is not None and effect.everywhere and not effect.of_artefact
-    ]  # fmt: skip
+    ]
 
 
 def _explored(
@@ -255,7 +255,6 @@ def _explored(
 
 
 def key_of(versions: Iterable[Version]) -> Key:
-    """Which explanations these are versions of."""
     return frozenset(v.explanation for v in versions)
 
 
@@ -347,7 +346,6 @@ class _Search:
         return versions
 
     def settle(self, versions: tuple[Version, ...]) -> None:
-        """Find the best sizes of a combination, and its evidence."""
         key = key_of(versions)
         if key in self.known and key not in self.settled:
             self.settled[key] = self.known[key]

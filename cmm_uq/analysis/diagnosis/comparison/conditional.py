@@ -18,8 +18,6 @@ _ABSORBED = 1e-5  # part of its length below which a column is the baseline's ow
 
 @dataclass(frozen=True)
 class Version:
-    """One version of an explanation at one size."""
-
     explanation: int
     member: int
     amplitude: float  # standard deviation of its coefficients, in units of the noise
@@ -151,8 +149,6 @@ class ConditionedData:
 
 @dataclass(frozen=True, eq=False)
 class Conditioning:
-    """Members that were given, and what is kept of them."""
-
     stack: Floats  # (m, K) columns of all members
     where: dict[MemberKey, slice]  # columns of the stack of each
     by_noise: Callable[[Floats], Floats]  # precision times columns (m, b), by kind of noise (k, m, b)

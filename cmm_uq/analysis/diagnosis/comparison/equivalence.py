@@ -19,8 +19,8 @@ import scipy
 from cmm_uq.analysis.diagnosis.comparison.combinations import CombinationPrior, Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
-from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, Explanation, Member
-from cmm_uq.base.messages import Verbatim
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, Explanation, Member, effect_of
+from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.points import Floats, Ints
 
 ODDS = 20.0
@@ -32,35 +32,37 @@ _DISTINCT = 1e-6  # part of a member's squared length that the others of a set m
 
 
 @dataclass(frozen=True)
-class EquivalentSet:
+class AlternativeSet:
     """Effects that together could stand in the place of others."""
 
-    instead_of: tuple[int, ...]
-    members: tuple[int, ...]
-    sizes: tuple[float, ...]  # of the members then, in prior standard deviations
+    instead_of: tuple[str, ...]  # names
+    effects: tuple[str, ...]
+    titles: tuple[Text, ...]  # of these, in words
+    sizes: tuple[float, ...]  # of these then, in prior standard deviations
     # of what they stand for over them by the readings alone: what of it they cannot be, one where they can be all of it
     odds: float
     prior_odds: float  # by what is known beforehand alone
 
 
-def equivalent_sets(
+def alternative_sets(
     comparison: CandidateComparison, combinations: Combinations, chosen: Key, versions: Sequence[Version]
-) -> tuple[EquivalentSet, ...]:
+) -> tuple[AlternativeSet, ...]:
     """Of each effect of one coefficient, and of each two, the smallest sets that the readings do not tell from them."""
-    single = [i for i in sorted(chosen) if _single(comparison.explanations[i])]
-    prior, found = (
-        CombinationPrior(comparison.explanations, combinations.counts, comparison.visible),
-        list[EquivalentSet](),
-    )
+    every, sets, found = comparison.explanations, list[tuple[Key, Key]](), list[AlternativeSet]()
+    prior = CombinationPrior(every, combinations.counts, comparison.visible)
+    names = [str.__str__(one.name) for one in every]
+    single = [i for i in sorted(chosen) if _single(every[i])]
     for taken in (*((i,) for i in single), *subsets(single, 2)):
         for members, sizes, lost, part in _instead(comparison, chosen, versions, taken):
-            if any(set(one.instead_of) <= set(taken) and set(one.members) <= set(members) for one in found):
+            own = frozenset(taken), frozenset(members)
+            if any(one[0] <= own[0] and one[1] <= own[1] for one in sets):
                 continue
-            after = (chosen - set(taken)) | set(members)
+            odds, after = float(np.exp(lost)), (chosen - own[0]) | own[1]
             beforehand = float(np.exp(np.clip(prior.log(chosen) - prior.log(after), -700, 700)))
-            one = EquivalentSet(taken, members, sizes, float(np.exp(lost)), beforehand)
-            if part <= _ALIKE or one.odds * one.prior_odds <= ODDS:
-                found.append(one)
+            if part <= _ALIKE or odds * beforehand <= ODDS:
+                sets.append(own)
+                named, titles = tuple(names[i] for i in members), tuple(effect_of(every[i]).title for i in members)
+                found.append(AlternativeSet(tuple(names[i] for i in taken), named, titles, sizes, odds, beforehand))
     return tuple(found)
 
 

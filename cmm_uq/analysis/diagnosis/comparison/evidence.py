@@ -98,7 +98,6 @@ class CandidateComparison:
 
     @cached_property
     def visible(self) -> frozenset[int]:
-        """Explanations of which the baseline leaves anything."""
         return frozenset(i for i, _ in self._where)
 
     @cached_property

@@ -35,8 +35,6 @@ _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """One version of an explanation."""
-
     columns: Floats  # (m, r) mm
     shape: tuple[float, ...] = ()  # nonlinear parameter that they belong to
     weight: float = 1.0  # how probable, among the versions
@@ -47,8 +45,6 @@ class Member:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A candidate."""
-
     name: Text  # the effect's name; for a nonparametric term what it depends on
     kind: str  # effect, several (known effects at once) or unknown (a nonparametric term)
     members: tuple[Member, ...]  # versions, as probable as their weights say
@@ -95,8 +91,10 @@ def known_effects(model: RecordingModel, values: Floats, named: tuple[str, ...])
             continue
         if any(np.any(member.columns) for member in members):
             if effect.mostly < 1:
-                members = (*(replace(m, columns=effect.mostly * m.columns) for m in members),
-                           *(replace(m, weight=_BEYOND) for m in members))  # fmt: skip
+                members = (
+                    *(replace(m, columns=effect.mostly * m.columns) for m in members),
+                    *(replace(m, weight=_BEYOND) for m in members),
+                )
             members = (*members, *_roughly(model, effect, points, values))
             together = effect.everywhere and reach >= _ADJUSTED
             found.append(Explanation(

@@ -39,8 +39,6 @@ NOT_TOLD_APART = 0.02  # odds from which another effect in the place of one coun
 
 @dataclass(frozen=True, eq=False)
 class ModelComparison:
-    """The candidates that a model's misfit is compared with."""
-
     model: RecordingModel  # model, values: what is explained so far, and its estimate
     values: Floats
     comparison: CandidateComparison
@@ -57,8 +55,6 @@ class ModelComparison:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What a search ends with."""
-
     first: ModelComparison  # comparison before anything is found
     last: CandidateComparison  # what is left after everything is, without candidates
     # of explanations, with their probabilities; None where the lack-of-fit test does not reject

@@ -26,8 +26,6 @@ _SINGULAR = 1e-9  # part of the largest singular value below which another count
 
 @dataclass(frozen=True)
 class FunctionVersion:
-    """One function at one size; ``probability`` among all."""
-
     family: int
     index: int
     amplitude: float  # standard deviation of its coefficients, in units of the noise
@@ -136,7 +134,6 @@ class FunctionFit:
 
     @cached_property
     def total(self) -> float:
-        """Log evidence of any function."""
         return float(scipy.special.logsumexp([scipy.special.logsumexp(log) for log, _ in self.evidence]))
 
     def versions(self, most: int = _FOLLOWED) -> list[FunctionVersion]:

@@ -24,8 +24,6 @@ Function = Callable[[Floats, Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """Functions of one covariate with a common name, K of them, each of r columns."""
-
     name: str
     parameters: tuple[str, ...]  # what shapes them, in the covariate's unit
     shapes: Floats  # (K, s)

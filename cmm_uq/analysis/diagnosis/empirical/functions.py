@@ -22,8 +22,6 @@ _PARTS = np.array([-0.5, -0.375, -0.25, -0.125, 0.0, 0.125, 0.25, 0.375, 0.5])  
 
 @dataclass(frozen=True)
 class FunctionTerm:
-    """What a function is of, and what it changes."""
-
     of: str  # covariates, joined by a comma
     title: Text = field(compare=False)
     along: str | None = None  # axis that points move along; None for a term of the observations themselves
@@ -38,8 +36,6 @@ Seen = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class FunctionFamily:
-    """Functions of one term and form, K of them."""
-
     term: FunctionTerm
     form: str
     columns: Floats  # (m, K, r) over the noise scale, for the size that physics allows

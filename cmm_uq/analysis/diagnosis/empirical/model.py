@@ -19,14 +19,7 @@ import scipy
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, effect_of
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
-from cmm_uq.analysis.diagnosis.empirical.evidence import (
-    IMPROBABLE,
-    FunctionFit,
-    FunctionVersion,
-    improvement_by,
-    improvements,
-    residuals,
-)
+from cmm_uq.analysis.diagnosis.empirical import evidence
 from cmm_uq.analysis.diagnosis.empirical.forms import SMOOTH
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm, families_of
 from cmm_uq.analysis.diagnosis.held_out import Improvement
@@ -54,8 +47,6 @@ class NamedForm:
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalFunction:
-    """A function that was fitted."""
-
     term: FunctionTerm
     probability: float  # that it is this term
     forms: tuple[tuple[str, float], ...]  # that are probable for it, most probable first
@@ -92,7 +83,7 @@ class BestKnown:
 
 def empirical_model(result: SearchResult) -> EmpiricalModel | None:
     """What functions of what is recorded make of the misfit; nothing where none has odds of 20 : 1."""
-    data = FunctionFit.of(result, families_of(result))
+    data = evidence.FunctionFit.of(result, families_of(result))
     if not data.families or not data.degrees:
         return None
     beside, described = data, list[EmpiricalFunction]()
@@ -104,7 +95,7 @@ def empirical_model(result: SearchResult) -> EmpiricalModel | None:
         beside = beside.with_function(beside.versions(1)[0])
     if not described:
         return None
-    gains = improvements(result, data, len(described))
+    gains = evidence.improvements(result, data, len(described))
     chosen = 0
     for i, gain in enumerate(gains[1:], 1):  # a further function is kept where it predicts better than those before it
         if gain.elpd_gain - gains[chosen].elpd_gain > gain.elpd_gain_se and (
@@ -116,7 +107,7 @@ def empirical_model(result: SearchResult) -> EmpiricalModel | None:
     return EmpiricalModel(tuple(described[: chosen + 1]), gain, better)
 
 
-def _described(data: FunctionFit, result: SearchResult) -> EmpiricalFunction:
+def _described(data: evidence.FunctionFit, result: SearchResult) -> EmpiricalFunction:
     by: dict[FunctionTerm, dict[str, float]] = {}
     for family, (log, _) in zip(data.families, data.evidence, strict=True):
         of_term = by.setdefault(family.term, {})
@@ -143,30 +134,30 @@ def _described(data: FunctionFit, result: SearchResult) -> EmpiricalFunction:
     )
 
 
-def _seen(data: FunctionFit, result: SearchResult, family: int) -> tuple[Floats, Floats, Floats]:
+def _seen(data: evidence.FunctionFit, result: SearchResult, family: int) -> tuple[Floats, Floats, Floats]:
     covariate, model = data.families[family].covariate, result.first.model
     rows = model.artefact.rows[model.used]
     each = (
         covariate[:, None] if len(covariate) == len(rows) else covariate[rows] if len(covariate) else np.zeros((0, 1))
     )
-    left = next(residuals(data, 0)) * result.first.comparison.noise_scale / MICROMETRE
+    left = next(evidence.residuals(data, 0)) * result.first.comparison.noise_scale / MICROMETRE
     return each.min(axis=1, initial=np.inf), each.max(axis=1, initial=-np.inf), left[: len(each)]
 
 
-def _among(data: FunctionFit, chosen: Sequence[int]) -> list[tuple[FunctionVersion, float]]:
+def _among(data: evidence.FunctionFit, chosen: Sequence[int]) -> list[tuple[evidence.FunctionVersion, float]]:
     """Versions of some families that are probable, with their probability among these."""
     logs = {i: data.evidence[i][0] for i in chosen}
     total = scipy.special.logsumexp([scipy.special.logsumexp(log) for log in logs.values()])
     found = [
-        (FunctionVersion(i, int(k), float(data.evidence[i][1][k, a])), float(np.exp(log[k, a] - total)))
+        (evidence.FunctionVersion(i, int(k), float(data.evidence[i][1][k, a])), float(np.exp(log[k, a] - total)))
         for i, log in logs.items()
-        for k, a in np.argwhere(log - total > np.log(IMPROBABLE))
+        for k, a in np.argwhere(log - total > np.log(evidence.IMPROBABLE))
     ]
     every = sum(p for _, p in found)
     return [(version, p / every) for version, p in found]
 
 
-def _function(data: FunctionFit, chosen: Sequence[int]) -> tuple[Floats, Floats, Floats]:
+def _function(data: evidence.FunctionFit, chosen: Sequence[int]) -> tuple[Floats, Floats, Floats]:
     """The function of a term where its covariate is given, averaged over forms and sizes, and its standard uncertainty, µm."""
     covariate = data.families[chosen[0]].covariate
     x, order = np.unique(covariate, return_index=True)
@@ -184,14 +175,14 @@ def _function(data: FunctionFit, chosen: Sequence[int]) -> tuple[Floats, Floats,
     return x, mean / MICROMETRE, np.sqrt(np.maximum(square - mean**2, 0.0)) / MICROMETRE
 
 
-def _amplitude(data: FunctionFit) -> float:
+def _amplitude(data: evidence.FunctionFit) -> float:
     """Largest part of an observation, µm, that the most probable function takes."""
     version = data.versions(1)[0]
     columns = data.families[version.family].columns[:, version.index]
     return float(np.abs(columns @ data.fitted(version)[0]).max()) / MICROMETRE
 
 
-def _named(data: FunctionFit, own: Sequence[int], name: str, probability: float) -> tuple[NamedForm, str]:
+def _named(data: evidence.FunctionFit, own: Sequence[int], name: str, probability: float) -> tuple[NamedForm, str]:
     finer = [data.families[i].divided(_likely(data.evidence[i][0])) for i in own]
     data = replace(data, families=finer)
     versions = _among(data, range(len(finer)))
@@ -222,7 +213,7 @@ def _named(data: FunctionFit, own: Sequence[int], name: str, probability: float)
 def _likely(log: Floats) -> Ints:
     """Functions (l,) of a family that are probable beside its best."""
     each = log.max(axis=1)
-    return np.flatnonzero(each > each.max() + np.log(IMPROBABLE))
+    return np.flatnonzero(each > each.max() + np.log(evidence.IMPROBABLE))
 
 
 def _quantity(value: float, variance: float, of: str) -> Quantity:
@@ -267,8 +258,10 @@ def best_known(result: SearchResult) -> BestKnown | None:
     odds = float(np.exp(min(max(first.log_odds[functions], default=-np.inf) - first.log_odds[best], 700.0)))
     member = first.comparison.beside((), (best,))[best][1].member
     columns = first.explanations[best].members[member].columns / first.comparison.noise_scale[:, None]
-    alone = replace(FunctionFit.of(result, ()), free=first.comparison.baseline)  # with nothing that was asserted
+    alone = replace(
+        evidence.FunctionFit.of(result, ()), free=first.comparison.baseline
+    )  # with nothing that was asserted
     effect, combinations = effect_of(first.explanations[best]), result.combinations
     probability = 0.0 if combinations is None else combinations.of(best)
-    gain = improvement_by(result, alone, columns)
+    gain = evidence.improvement_by(result, alone, columns)
     return BestKnown(effect.name, effect.title, probability, odds, gain, effect.points_to)

@@ -85,8 +85,6 @@ class PartCause(ABC):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CommonCause(PartCause):
-    """What points have in common."""
-
     basis: Floats  # (K, n, 3) displacements of the points for one unit of each coefficient, mm
     _raising: dict[tuple[int, int], tuple[Floats, Floats]] = field(default_factory=dict, init=False)
 

@@ -15,7 +15,7 @@ effective size and offset, and so do not act on the part again. The sphere is pr
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ from cmm_uq.analysis.parts.causes.cause import (
     field_components,
     normal,
 )
-from cmm_uq.analysis.parts.plan import OWN_COLUMNS, PartPose, Plan, Stylus, probed
+from cmm_uq.analysis.parts.plan import OWN_COLUMNS, PartPose, Plan, probed
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
@@ -71,20 +71,16 @@ def styli(plan: Plan, pose: PartPose) -> list[PartCause]:
             factors = (f"tip offset {stylus.name}",) * len(AXES)
             found.append(CommonCause(name=STYLUS, factors=factors, draw=normal(stylus.u_offset_um), basis=basis))
         if stylus.lobing_um:
-            found.append(_lobing(stylus, plan, its))
+            variance = (MICROMETRE * stylus.lobing_um) ** 2
+            lobed = field_components(partial(_lobing, variance, plan.normals, its), np.where(its, variance, 0.0))
+            found.append(field_along(STYLUS, f"lobing {stylus.name}", lobed, plan.normals))
     return found
 
 
-def _lobing(stylus: Stylus, plan: Plan, its: NDArray[np.bool_]) -> CommonCause:
-    variance = (MICROMETRE * stylus.lobing_um) ** 2
-
-    def covariance(some: slice) -> Floats:
-        cosine = np.clip(plan.normals[some] @ plan.normals.T, -1.0, 1.0)
-        mean = np.mean([eval_legendre(degree, cosine) for degree in DEGREES], axis=0)
-        return np.asarray(variance * mean * np.outer(its[some], its))
-
-    shapes = field_components(covariance, np.where(its, variance, 0.0))
-    return field_along(STYLUS, f"lobing {stylus.name}", shapes, plan.normals)
+def _lobing(variance: float, normals: Floats, its: NDArray[np.bool_], some: slice) -> Floats:
+    cosine = np.clip(normals[some] @ normals.T, -1.0, 1.0)
+    mean = np.mean([eval_legendre(degree, cosine) for degree in DEGREES], axis=0)
+    return np.asarray(variance * mean * np.outer(its[some], its))
 
 
 def directions() -> Floats:
@@ -188,16 +184,6 @@ def _plain(state: MachineState) -> tuple[Superposition, Floats, Floats]:
     return Superposition(effects, state.shapes), state.mean[kept], state.corrects[kept]
 
 
-def _about(state: MachineState, qualified: Qualified) -> About:
-    acting, mean, _ = _plain(state)
-    return acting.about(qualified.both, mean)
-
-
-def _as_read(about: About, read: Points) -> About:
-    """The same with what scales read, by which errors with a period go."""
-    return replace(about, points=replace(read, directions=about.points.directions))
-
-
 def _read(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None) -> Points:
     """Points of part and spheres as the scales read them: what was measured less what the machine corrected."""
     points, n = qualified.both, len(qualified.part)
@@ -221,17 +207,19 @@ def _indicated(acting: Superposition, coefficients: Floats, points: Points, true
 
 def _columns_of(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None) -> Floats:
     """(n + q, 3, k) errors by small changes of what was modelled about its mean (:meth:`Superposition.about`)."""
-    about = _about(state, qualified)
+    acting, mean, _ = _plain(state)
+    about = acting.about(qualified.both, mean)
     given = any(isinstance(effect, GivenPeriod) for effect in state.effects)
     read = _read(state, qualified, pose, measured) if given else qualified.both
-    return np.concatenate([
-        np.zeros((len(qualified.both), 3, 0)),
-        *(
-            _as_read(about, read).columns(effect) if isinstance(effect, GivenPeriod)
-            else about.columns(effect, state.shapes.get(effect.name, ()))
-            for effect in state.effects
-        ),
-    ], axis=2)  # fmt: skip
+    none = np.zeros((len(qualified.both), 3, 0))
+    as_read = replace(about, points=replace(read, directions=about.points.directions))  # errors with a period go by it
+    columns = (
+        as_read.columns(effect)
+        if isinstance(effect, GivenPeriod)
+        else about.columns(effect, state.shapes.get(effect.name, ()))
+        for effect in state.effects
+    )
+    return np.concatenate([none, *columns], axis=2)
 
 
 def _modelled(state: MachineState, qualified: Qualified, pose: PartPose, columns: Floats) -> CommonCause:

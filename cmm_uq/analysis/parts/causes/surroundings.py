@@ -133,8 +133,6 @@ def elapsed(plan: Plan) -> Floats:
 
 @dataclass(frozen=True)
 class Expansion:
-    """A body that expands, and what is known of it."""
-
     # cte_per_k, u_cte_per_k: coefficient of thermal expansion, and its standard uncertainty
     cte_per_k: float = 0.0
     u_cte_per_k: float = 0.0
@@ -158,7 +156,6 @@ class Expansion:
 
     @property
     def uncertain(self) -> bool:
-        """Whether anything of it is."""
         return bool(self.u_cte_per_k or (self.u_temperature_k and (self.cte_per_k or self.u_cte_per_k)))
 
     def drawn(self, cte: Floats, kelvin: Floats) -> Floats:
@@ -169,8 +166,6 @@ class Expansion:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Temperatures at the measurement of a part."""
-
     part: Expansion = Expansion()  # the part
     # of x, y, z, of one material: what is not known of their coefficient is common to them. Without uncertainty by default,
     # as it is right where the machine's certificate models their expansion.

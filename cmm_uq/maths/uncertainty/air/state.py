@@ -264,12 +264,9 @@ def refractive_index(air: Air, equation: str = "ciddor") -> tuple[Floats, Floats
 def check_range(air: Air, equation: AirEquation) -> None:
     """Refuse estimates out of the range of an equation."""
     ranges = {
-        "temperature_c": equation.temperature_c,
-        "pressure_pa": (10e3, 140e3),
-        "humidity_pct": (0.0, 100.0),
-        "co2_ppm": (0.0, 2000.0),
-        "wavelength_nm": equation.wavelength_nm,
-    }
+        "temperature_c": equation.temperature_c, "pressure_pa": (10e3, 140e3), "humidity_pct": (0.0, 100.0),
+        "co2_ppm": (0.0, 2000.0), "wavelength_nm": equation.wavelength_nm,
+    }  # fmt: skip
     inputs = air.inputs
     if "dew_point_c" in inputs:
         dew = relative_humidity(np.asarray(air.temperature_c.mean), np.asarray(inputs["dew_point_c"].mean))

@@ -36,17 +36,10 @@ def _use(source: Text) -> Text:
 
 
 def length_test_uncertainty(
-    length_mm: float,
-    u_calibration_mm: float,
-    *,
-    temperature_c: float = REFERENCE_TEMPERATURE,
-    cte_per_k: float = 0.0,
-    u_cte_per_k: float = 0.0,
-    u_temperature_k: float = 0.0,
-    u_alignment_mm: float = 0.0,
-    u_fixturing_mm: float = 0.0,
+    length_mm: float, u_calibration_mm: float, *, temperature_c: float = REFERENCE_TEMPERATURE, cte_per_k: float = 0.0,
+    u_cte_per_k: float = 0.0, u_temperature_k: float = 0.0, u_alignment_mm: float = 0.0, u_fixturing_mm: float = 0.0,
     u_beside_mm: float = 0.0,
-) -> Budget:
+) -> Budget:  # fmt: skip
     """Test uncertainty of an error of length measurement E (ISO/TS 23165:2006), mm.
 
     ``u_fixturing_mm``: by what the clamping does to the length. ``u_beside_mm``: of the short gauge measured beside lengths
@@ -76,17 +69,10 @@ def probing_test_uncertainty(form_mm: float, u_form_mm: float) -> Budget:
 
 
 def use_by_calibrated_workpiece(
-    readings_mm: Sequence[float] | Floats,
-    calibrated_mm: float,
-    u_calibration_mm: float,
-    *,
-    temperature_c: float = REFERENCE_TEMPERATURE,
-    u_cte_calibrated_per_k: float = 0.0,
-    u_cte_workpieces_per_k: float = 0.0,
-    u_form_mm: float = 0.0,
-    expanding_mm: float | None = None,
-    angle: bool = False,
-) -> Budget:
+    readings_mm: Sequence[float] | Floats, calibrated_mm: float, u_calibration_mm: float, *,
+    temperature_c: float = REFERENCE_TEMPERATURE, u_cte_calibrated_per_k: float = 0.0,
+    u_cte_workpieces_per_k: float = 0.0, u_form_mm: float = 0.0, expanding_mm: float | None = None, angle: bool = False,
+) -> Budget:  # fmt: skip
     """Uncertainty of using the machine, from readings of a calibrated workpiece (ISO 15530-3:2011), mm.
 
     The value is the systematic error b = mean reading − calibrated value, by which results are corrected; where they

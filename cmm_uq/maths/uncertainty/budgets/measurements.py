@@ -170,14 +170,9 @@ def sphere_covariance(directions: Floats, u_point_mm: float) -> Floats:
 
 
 def sphere_budgets(
-    estimate_mm: Sequence[float] | Floats,
-    covariance_mm2: Floats,
-    form_shift_mm: Sequence[float] | Floats,
-    *,
-    dof: float = inf,
-    form_origin: Text = say("certificate of the ball"),
-    further: Sequence[BudgetLine] = (),
-) -> dict[str, Budget]:
+    estimate_mm: Sequence[float] | Floats, covariance_mm2: Floats, form_shift_mm: Sequence[float] | Floats, *,
+    dof: float = inf, form_origin: Text = say("certificate of the ball"), further: Sequence[BudgetLine] = (),
+) -> dict[str, Budget]:  # fmt: skip
     """Budgets of x, y, z and radius.
 
     ``estimate_mm``: (4,) centre and radius. ``covariance_mm2``: (4, 4) of the fit. ``form_shift_mm``: (4,) how far, at most,
@@ -210,13 +205,10 @@ def _stretch(cte_per_k: Any, temperature_c: Any) -> Any:
 
 
 def length_at_20(
-    indicated_mm: Distribution,
-    workpiece_c: Distribution,
-    workpiece_cte_per_k: Distribution,
-    scale_c: Distribution | None = None,
-    scale_cte_per_k: Distribution | None = None,
+    indicated_mm: Distribution, workpiece_c: Distribution, workpiece_cte_per_k: Distribution,
+    scale_c: Distribution | None = None, scale_cte_per_k: Distribution | None = None,
     correlation: Correlations | None = None,
-) -> MeasurementModel:
+) -> MeasurementModel:  # fmt: skip
     """Length at 20 °C (ISO 1) of a workpiece measured warm by a scale that may be warm too.
 
     ``correlation``: such as that of the two temperatures, which one thermometer may have measured.
@@ -233,12 +225,9 @@ def length_at_20(
 
 
 def scale_error(
-    indicated_mm: Distribution,
-    reference_mm: Distribution,
-    workpiece_c: Distribution,
-    workpiece_cte_per_k: Distribution,
-    correlation: Correlations | None = None,
-) -> MeasurementModel:
+    indicated_mm: Distribution, reference_mm: Distribution, workpiece_c: Distribution,
+    workpiece_cte_per_k: Distribution, correlation: Correlations | None = None,
+) -> MeasurementModel:  # fmt: skip
     """Relative scale error s, true = indicated · (1 + s), from a reference length calibrated at 20 °C."""
     names = ("indicated_mm", "reference_mm", "workpiece_c", "workpiece_cte_per_k")
     inputs = dict(zip(names, (indicated_mm, reference_mm, workpiece_c, workpiece_cte_per_k), strict=True))

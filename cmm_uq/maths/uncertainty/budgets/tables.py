@@ -27,11 +27,8 @@ from cmm_uq.maths.uncertainty.budgets import machine, measurements
 Coefficient = Annotated[float, Field(ge=0, le=1e-3)]  # of expansion, or its standard uncertainty, 1/K
 Kelvin = Annotated[float, Field(ge=0, le=100)]  # a standard uncertainty of a temperature
 Readings = Annotated[list[Position], Field(max_length=LISTED.most)]
+Squarenesses = Annotated[list[Annotated[float, Field(ge=0, le=36_000)]], Field(min_length=3, max_length=3)]
 Three = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]  # of x, y, z
-
-
-def _none() -> list[float]:
-    return [0.0, 0.0, 0.0]
 
 
 class BudgetTable(JobTable):
@@ -52,7 +49,14 @@ class BudgetTable(JobTable):
         return {}
 
 
-class CalibratedWorkpiece(BudgetTable):
+class _OfUse(BudgetTable):
+    def remarks(self) -> Mapping[str, float]:
+        """U + |b|, of results that are not corrected."""
+        (budget,) = self.budgets().values()
+        return {"U_without_correction_mm": machine.expanded_without_correction(budget)}
+
+
+class CalibratedWorkpiece(_OfUse):
     """``method = "ISO 15530-3"``."""
 
     meaning = say("ISO 15530-3:2011: uncertainty of measuring workpieces, from readings of a calibrated one.")
@@ -77,10 +81,6 @@ class CalibratedWorkpiece(BudgetTable):
             )
         }  # fmt: skip
 
-    def remarks(self) -> Mapping[str, float]:
-        """U + |b|, of results that are not corrected."""
-        return {"U_without_correction_mm": machine.expanded_without_correction(self.budgets()["systematic_error"])}
-
 
 class NotSimulated(JobTable):
     """A contribution that a simulation leaves out."""
@@ -90,7 +90,7 @@ class NotSimulated(JobTable):
     source: str = key(JUDGEMENT, "Where the figure comes from.")
 
 
-class SimulatedTask(BudgetTable):
+class SimulatedTask(_OfUse):
     """``method = "ISO 15530-4"``."""
 
     meaning = say("ISO/TS 15530-4:2008: uncertainty of a measurement task, from simulated measurements of it.")
@@ -107,10 +107,6 @@ class SimulatedTask(BudgetTable):
             for one in self.not_simulated
         ]
         return {"error": machine.use_by_simulation(np.array(self.simulated_errors_um) * MICROMETRE, lines)}
-
-    def remarks(self) -> Mapping[str, float]:
-        """U + |b|, of results that are not corrected."""
-        return {"U_without_correction_mm": machine.expanded_without_correction(self.budgets()["error"])}
 
 
 class LengthTest(BudgetTable):
@@ -166,11 +162,9 @@ class BallbarBudget(BudgetTable):
     probe_um: Uncertainty = key(0.0, "Largest systematic shift of a ball by the probe.")
     probe_common: Annotated[float, Field(ge=-1, le=1)] = 0.0
     """Correlation of that shift between the two balls: 1 where both are seen the same way."""
-    scale_um: Three = Field(default_factory=_none)
+    scale_um: Three = Field(default_factory=lambda: [0.0, 0.0, 0.0])
     """Largest errors of the scales over the bar along x, y, z."""
-    u_squareness_arcsec: Annotated[
-        list[Annotated[float, Field(ge=0, le=36_000)]], Field(min_length=3, max_length=3)
-    ] = Field(default_factory=_none)
+    u_squareness_arcsec: Squarenesses = Field(default_factory=lambda: [0.0, 0.0, 0.0])
     """Standard uncertainties of the squareness xy, yz, zx."""
     u_temperature_k: Kelvin = key(0.0, "Standard uncertainty of the bar's temperature.")
     cte_per_k: Coefficient = key(0.0, "Coefficient of thermal expansion of the bar, 1/K.")

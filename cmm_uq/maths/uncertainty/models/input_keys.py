@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import pint_units
 from cmm_uq.maths.uncertainty import distributions as make
 from cmm_uq.maths.uncertainty.distributions import Distribution
-from cmm_uq.maths.uncertainty.models.expression import Expression, Step
+from cmm_uq.maths.uncertainty.models.expression import Expression
 from cmm_uq.maths.uncertainty.type_a import repeated_readings
 
 if TYPE_CHECKING:
@@ -36,8 +36,6 @@ _AGREEMENT = 1e-9
 
 def distribution_from(kind: str, keys: Keys) -> Distribution:
     """Distribution by its name in JCGM 101:2008 table 1, ``sampled`` or ``constant``, from any of :data:`NUMERIC`."""
-    if kind not in KINDS:
-        raise CmmUqError(f"there is no distribution {kind!r}", fix=suggestion(kind, KINDS))
     allowed, build = KINDS[kind]
     for key in keys:
         if key not in allowed:
@@ -271,19 +269,16 @@ def _unit_of(expression: Expression, units: Mapping[str, str]) -> Any:
     for step in expression.steps:
         operands = stack[len(stack) - step.operands :]
         del stack[len(stack) - step.operands :]
-        stack.append(_unit_of_step(step, operands, units))
-    return stack[0]
-
-
-def _unit_of_step(step: Step, operands: list[Any], units: Mapping[str, str]) -> Any:
-    if step.kind == "number":
-        return _Number(step.item)
-    if step.kind == "name":
-        if not units.get(str(step.item)):
+        if step.kind == "number":
+            stack.append(_Number(step.item))
+        elif step.kind == "operation":
+            rule: Callable[..., Any] = _RULES.get(str(step.item), _dimensionless)
+            stack.append(rule(*operands))
+        elif units.get(str(step.item)):
+            stack.append(unit_of(_CELSIUS.sub("kelvin", units[str(step.item)])))
+        else:
             raise _UndeterminedError
-        return unit_of(_CELSIUS.sub("kelvin", units[str(step.item)]))
-    rule: Callable[..., Any] = _RULES.get(str(step.item), _dimensionless)
-    return rule(*operands)
+    return stack[0]
 
 
 def _dimensionless(*operands: Any) -> Any:

@@ -7,8 +7,7 @@ an error that names file and key.
 from __future__ import annotations
 
 import hashlib
-import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -16,12 +15,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field, WrapValidator
 
-from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT, content_of, text_of
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT, content_of
 from cmm_uq.base.files.table import JobTable, key, required
-from cmm_uq.base.files.toml_file import toml_of
+from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, say
 from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution
@@ -29,11 +28,29 @@ from cmm_uq.maths.uncertainty.evaluation import METHODS, Evaluation, Request, ev
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.models import input_keys
 from cmm_uq.maths.uncertainty.models.expression import Expression, name_problem, parse
-from cmm_uq.maths.uncertainty.models.input_keys import KINDS, NUMERIC, contradiction, derived_unit, unit_of
-from cmm_uq.maths.uncertainty.models.ready import KEY, READY, ReadyBudget, read_ready_budget, ready_model
+from cmm_uq.maths.uncertainty.models.ready import READY, BudgetFile, ReadyBudget, ready_model
 from cmm_uq.maths.uncertainty.type_a import simultaneous_readings
 
-Figure = float | str  # A number, or a text of a number and its unit, such as ``"25 nm"``
+_SMALLEST, _LARGEST = 1e-70, 1e70
+
+
+def _moderate(number: float) -> float:
+    if number and not _SMALLEST < abs(number) < _LARGEST:
+        size = "large" if abs(number) > 1 else "small"
+        raise ValueError(f"is too {size} to be squared and added up: state it in another unit")
+    return number
+
+
+def _figure(value: Any, _: Callable[[Any], Any]) -> float | str:
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+        raise ValueError("is not a finite number, nor one with its unit")
+    return _moderate(float(value))
+
+
+Plain = Annotated[float, AfterValidator(_moderate)]
+Figure = Annotated[float | str, WrapValidator(_figure)]  # a number, or text of one and its unit, such as ``"25 nm"``
 
 
 class ModelTable(JobTable):
@@ -56,19 +73,19 @@ class ModelTable(JobTable):
 class InputTable(JobTable):
     """``[inputs.NAME]``: which of the figures belong together says the distribution."""
 
-    distribution: Literal[tuple(KINDS)] | None = None  # type: ignore[valid-type]
+    distribution: Literal[tuple(input_keys.KINDS)] | None = None  # type: ignore[valid-type]
     """Distribution of JCGM 101:2008 table 1, `sampled` or `constant`; `t` where only samples are given."""
     value: Figure | None = key(None, "Estimate: mean, middle of the limits, or count.")
     u: Figure | None = key(None, "Standard uncertainty.")
-    dof: float | None = key(None, "Degrees of freedom of u; finite ones say how well u itself is known.")
+    dof: Plain | None = key(None, "Degrees of freedom of u; finite ones say how well u itself is known.")
     expanded: Figure | None = None
     """Expanded uncertainty of a certificate, in place of `u`; needs `coverage_factor`."""
-    coverage_factor: float | None = key(None, "Coverage factor of `expanded`.")
+    coverage_factor: Plain | None = key(None, "Coverage factor of `expanded`.")
     low: Figure | None = key(None, "Lower limit.")
     high: Figure | None = key(None, "Upper limit.")
     half_width: Figure | None = key(None, "Half the distance of the limits, with `value`.")
     limit: Figure | None = key(None, "How far each limit of `rectangular_uncertain` is in doubt.")
-    beta: float | None = key(None, "Ratio of top to base of a trapezoid, or doubt of the limits over the half-width.")
+    beta: Plain | None = key(None, "Ratio of top to base of a trapezoid, or doubt of the limits over the half-width.")
     samples: list[Figure] | None = key(None, "Repeated readings, or draws of an earlier analysis (`sampled`).")
     unit: str = key("", "Unit in which the model takes the input.")
     source: str = key("", "Where the figures come from, for the budget.")
@@ -82,13 +99,8 @@ class ModelFileTable(JobTable):
 
     model: ModelTable = required("What is evaluated, and how.")
     inputs: dict[str, InputTable] = required("What is known of each input, by its name.")
-    correlation: dict[str, float] = {}
+    correlation: dict[str, Plain] = {}
     """Correlation of two inputs, as `"x1,x2" = 0.9`."""
-
-
-TOP, MODEL = tuple(ModelFileTable.model_fields), tuple(ModelTable.model_fields)
-TEXTS = tuple(name for name in InputTable.model_fields if name not in NUMERIC)
-_SMALLEST, _LARGEST = 1e-70, 1e70
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +123,10 @@ class ModelFile:
         return hashlib.sha256(self.content).hexdigest()
 
     def evaluate(self, seed: int | None = None) -> Evaluation:
-        """Evaluate it, with another seed where one is given."""
         request = self.request if seed is None else replace(self.request, seed=seed)
         return evaluate(self.model, request, self.labels)
 
     def further(self) -> dict[str, Any]:
-        """Keys of results.json beside those of every budget: none."""
         return {}
 
 
@@ -126,57 +136,65 @@ def read_model_file(path: Path) -> ModelFile | ReadyBudget:
     Raises :class:`CmmUqError` where it cannot be read, is no TOML, or a key is unknown, missing, wrong or contradicting.
     """
     content = content_of(path, MODEL_BYTES, "Name the TOML file of the measurement model")
-    text = text_of(content, str(path))
-    try:
-        data = toml_of(text, str(path), most_word=TEXT.most, most_listed=DRAWS.most)
-    except tomllib.TOMLDecodeError as error:
-        raise CmmUqError(f"is not TOML: {error}", where=str(path), fix="Mend the line that it names") from error
-    if KEY in data:
-        return read_ready_budget(content, path)
-    return _Reader(str(path)).model_file(data, path.stem, content)
+
+    def kind(data: dict[str, Any]) -> type[ModelFileTable | BudgetFile]:
+        return BudgetFile.named(data, path) or ModelFileTable
+
+    table = checked(content, path, kind, most_word=TEXT.most, most_listed=DRAWS.most)
+    if isinstance(table, BudgetFile):
+        return ReadyBudget(table.budget.title or path.stem, table.budget, content)
+    return _Reader(str(path), table).model_file(path.stem, content)
 
 
 @dataclass(frozen=True)
 class _Reader:
-    """The checks, each of which says file and key."""
-
     file: str
+    table: ModelFileTable
 
-    def model_file(self, data: Mapping[str, Any], stem: str, content: bytes) -> ModelFile:
-        self._known(data, TOP, "")
-        model, given = self._table(data, "model", ""), self._table(data, "inputs", "")
-        correlation = self._correlation(data)
+    def model_file(self, stem: str, content: bytes) -> ModelFile:
+        model, given = self.table.model, self.table.inputs
         if not given:
             raise self._refused("there are no inputs", "", "Describe each in a table [inputs.<name>]")
-        self._known(model, MODEL, "[model]")
-        inputs = {name: self._input(name, keys) for name, keys in given.items()}
-        inputs, within = self._simultaneous(inputs, given)
-        for a, b in within:
-            if (a, b) in correlation or (b, a) in correlation:
-                problem = f"the correlation of {a} and {b} follows from their simultaneous readings"
+        for name, entries in (("inputs", given), ("outputs", model.outputs), ("correlation", self.table.correlation)):
+            if len(entries) > INPUTS.most:
+                raise self._refused(f"{name} has {len(entries)} entries", "", f"{INPUTS.most} are the most")
+        numbers = {name: self._numbers(name, keys) for name, keys in given.items()}
+        inputs = {name: self._input(name, keys, numbers[name]) for name, keys in given.items()}
+        inputs, within = self._simultaneous(inputs, numbers)
+        joint = dict(within)
+        for pair, coefficient in self.table.correlation.items():
+            if pair.count(",") != 1:
+                raise self._refused(f"{pair!r} is not a pair of inputs", "[correlation]", 'Write "x1,x2" = 0.9')
+            a, b = (name.strip() for name in pair.split(","))
+            if {(a, b), (b, a)} & within.keys():
+                problem = f"the correlation of {pair} follows from their simultaneous readings"
                 raise self._refused(problem, "[correlation]", "Leave the line out")
-        joint = {**within, **correlation}
+            joint[a, b] = coefficient
         expressions: dict[str, Expression] = {}
-        descriptions = {name: keys["description"] for name, keys in given.items() if "description" in keys}
-        if "ready" in model:
-            units = {name: keys.get("unit", "") for name, keys in given.items()}
+        descriptions: dict[str, str] = {name: keys.description for name, keys in given.items() if keys.description}
+        units, origins = {name: keys.unit for name, keys in given.items()}, self._origins()
+        if model.ready is not None:
+            for key in ("outputs", "units"):
+                if getattr(model, key):
+                    problem = f"{key} is given, and the ready model has its own"
+                    raise self._refused(problem, "[model] ready", "Leave one of them out")
             with self._located(""):
-                whole, labels = ready_model(model, inputs, units, joint)
-            labels = replace(labels, origins={**labels.origins, **_origins(given)})
-            descriptions = {say("Ready model"): READY[model["ready"]].title} | descriptions
+                whole, labels = ready_model(READY[model.ready], inputs, units, joint)
+            labels = replace(labels, origins={**labels.origins, **origins})
+            descriptions = {say("Ready model"): READY[model.ready].title} | descriptions
         else:
-            expressions.update(self._outputs(model, inputs))
+            expressions.update(self._outputs(model.outputs, inputs))
             whole = MeasurementModel(
                 lambda **values: {name: expression(values) for name, expression in expressions.items()},
                 inputs,
                 list(expressions),
                 joint,
             )
-            labels = self._labels(given, model, expressions)
+            labels = Labels(units | self._units(expressions, units), origins)
         with self._located(""):
             _ = whole.correlation_matrix
-        title = self._text(model, "title", "[model]") or stem
-        return ModelFile(title, expressions, whole, self._request(model), labels, descriptions, content)
+        request = Request(model.method, model.coverage, model.digits, model.seed)
+        return ModelFile(model.title or stem, expressions, whole, request, labels, descriptions, content)
 
     def _where(self, key: str) -> str:
         return f"{self.file} {key}".strip()
@@ -192,80 +210,51 @@ class _Reader:
         except CmmUqError as error:
             raise self._refused(error.problem, f"{key} {error.where or ''}".strip(), error.fix) from error
 
-    def _known(self, table: Mapping[str, Any], allowed: tuple[str, ...], key: str) -> None:
-        for name in table:
-            if name not in allowed:
-                raise self._refused(f"there is no key {name!r}", key, suggestion(name, allowed))
-
-    def _table(self, data: Mapping[str, Any], name: str, within: str) -> Mapping[str, Any]:
-        if name not in data:
-            raise self._refused(f"[{name}] is missing", within, f"Add a table [{name}]")
-        table = data[name]
-        if not isinstance(table, dict):
-            raise self._refused(f"{name} is not a table", within, f"Write it as [{name}]")
-        if len(table) > INPUTS.most:
-            raise self._refused(f"{name} has {len(table)} entries", within, f"{INPUTS.most} are the most")
-        return table
-
-    def _text(self, table: Mapping[str, Any], name: str, key: str) -> str:
-        if not isinstance(table.get(name, ""), str):
-            raise self._refused(f"{name} is not text", key, 'Put it in quotes: "…"')
-        return str(table.get(name, ""))
-
-    def _number(self, number: Any, key: str) -> float:
-        if isinstance(number, bool) or not isinstance(number, (int, float)) or not isfinite(number):
-            raise self._refused(f"{number!r} is not a finite number", key, "Write it as in 0.05")
-        if number and not _SMALLEST < abs(number) < _LARGEST:
-            problem = f"{number:g} is too {'large' if abs(number) > 1 else 'small'} to be squared and added up"
-            raise self._refused(problem, key, "State it in another unit")
-        return float(number)
-
-    def _input(self, name: str, keys: Any) -> Distribution:
+    def _numbers(self, name: str, keys: InputTable) -> dict[str, Any]:
+        """Keys of an input that are stated, as numbers in its unit; readings as an array."""
         key = f"[inputs.{name}]"
         if problem := name_problem(name):
             raise self._refused(problem, key, "Choose another name")
-        if not isinstance(keys, dict):
-            raise self._refused(f"{name} is not a table", "[inputs]", f"Write it as {key}")
-        self._known(keys, (*TEXTS, *sorted(NUMERIC)), key)
-        for text in TEXTS:
-            self._text(keys, text, key)
-        if keys.get("unit"):
-            unit_of(keys["unit"], self._where(f"{key} unit"))
-        numbers = {k: self._numbers(keys, k, f"{key} {k}") for k in keys if k in NUMERIC}
-        kind = keys.get("distribution") or ("t" if "samples" in numbers else None)
-        with self._located(key):
+        if keys.unit:
+            input_keys.unit_of(keys.unit, self._where(f"{key} unit"))
+
+        def number(of: str, figure: float | str) -> float:
+            if not isinstance(figure, str):
+                return figure
+            return input_keys.number_in(
+                figure, keys.unit, difference=of in input_keys.DIFFERENCES, where=self._where(f"{key} {of}")
+            )
+
+        stated = {of: getattr(keys, of) for of in InputTable.model_fields if of in input_keys.NUMERIC}
+        return {
+            of: np.array([number(of, one) for one in figure]) if isinstance(figure, list) else number(of, figure)
+            for of, figure in stated.items()
+            if figure is not None
+        }
+
+    def _input(self, name: str, keys: InputTable, numbers: Mapping[str, Any]) -> Distribution:
+        kind = keys.distribution or ("t" if "samples" in numbers else None)
+        with self._located(f"[inputs.{name}]"):
             if kind is None:
                 raise CmmUqError("'distribution' is missing", fix="Give one, such as 'normal' or 'rectangular'")
             return input_keys.distribution_from(kind, numbers)
 
-    def _numbers(self, keys: Mapping[str, Any], name: str, key: str) -> Any:
-        given = keys[name]
-        if name == "samples":
-            if not isinstance(given, list):
-                raise self._refused("samples is not a list", key, "Write it as in [1.2, 1.3]")
-            return np.array([self._number(sample, key) for sample in given])
-        if isinstance(given, str):
-            difference = name in input_keys.DIFFERENCES
-            return input_keys.number_in(given, keys.get("unit", ""), difference=difference, where=self._where(key))
-        return self._number(given, key)
-
     def _simultaneous(
-        self, inputs: Mapping[str, Distribution], given: Mapping[str, Any]
+        self, inputs: Mapping[str, Distribution], numbers: Mapping[str, Mapping[str, Any]]
     ) -> tuple[dict[str, Distribution], dict[tuple[str, str], float]]:
         """Inputs read together, marked by the same ``simultaneous``, with the correlations of their readings."""
-        marked = dict(inputs)
-        correlations: dict[tuple[str, str], float] = {}
+        marked, correlations = dict(inputs), dict[tuple[str, str], float]()
         sets: dict[str, list[str]] = {}
-        for name, keys in given.items():
-            if keys.get("simultaneous"):
-                sets.setdefault(keys["simultaneous"], []).append(name)
+        for name, keys in self.table.inputs.items():
+            if keys.simultaneous:
+                sets.setdefault(keys.simultaneous, []).append(name)
         for label, names in sets.items():
             key = f"[inputs.{names[0]}] simultaneous"
             for name in names:
-                if "samples" not in given[name]:
+                if "samples" not in numbers[name]:
                     raise self._refused(f"{name} has no samples", key, "Give its readings")
             kinds = {inputs[name].kind for name in names}
-            samples = {name: given[name]["samples"] for name in names}
+            samples = {name: numbers[name]["samples"] for name in names}
             if kinds == {"sampled"}:
                 if len({len(draws) for draws in samples.values()}) != 1:
                     raise self._refused("the numbers of draws differ", key, "Give whole rows")
@@ -277,60 +266,34 @@ class _Reader:
                 raise self._refused("readings and draws are mixed", key, "Use one distribution")
         return marked, correlations
 
-    def _outputs(self, model: Mapping[str, Any], inputs: Mapping[str, Distribution]) -> dict[str, Expression]:
-        outputs = self._table(model, "outputs", "[model]")
+    def _outputs(self, outputs: Mapping[str, str], inputs: Mapping[str, Distribution]) -> dict[str, Expression]:
         if not outputs:
             raise self._refused("there are no outputs", "[model]", 'outputs = { y = "…" }')
         parsed = {}
-        for name in outputs:
+        for name, text in outputs.items():
             key = f"[model] outputs.{name}"
             if problem := name_problem(name) or (f"{name!r} is also an input" if name in inputs else None):
                 raise self._refused(problem, key, "Choose another name")
-            parsed[name] = parse(self._text(outputs, name, key), inputs.keys(), self._where(key))
+            parsed[name] = parse(text, inputs.keys(), self._where(key))
         return parsed
 
-    def _correlation(self, data: Mapping[str, Any]) -> dict[tuple[str, str], float]:
-        pairs: dict[tuple[str, str], float] = {}
-        for pair, number in self._table({"correlation": {}, **data}, "correlation", "").items():
-            names = [name.strip() for name in pair.split(",")]
-            if len(names) != 2:
-                raise self._refused(f"{pair!r} is not a pair of inputs", "[correlation]", 'Write "x1,x2" = 0.9')
-            pairs[names[0], names[1]] = self._number(number, f"[correlation] {pair}")
-        return pairs
-
-    def _request(self, model: Mapping[str, Any]) -> Request:
-        request: dict[str, Any] = {}
-        if "method" in model:
-            request["method"] = self._text(model, "method", "[model] method")
-        for name in ("coverage", "digits", "seed"):
-            if name in model:
-                request[name] = number = self._number(model[name], f"[model] {name}")
-                if name != "coverage":
-                    if number != int(number):
-                        raise self._refused(f"{number} is not an integer", f"[model] {name}")
-                    request[name] = int(number)
-        with self._located("[model]"):
-            return Request(**request)
-
-    def _labels(
-        self, given: Mapping[str, Any], model: Mapping[str, Any], expressions: Mapping[str, Expression]
-    ) -> Labels:
-        units = {name: keys.get("unit", "") for name, keys in given.items()}
-        stated = self._table({"units": {}, **model}, "units", "[model]")
-        self._known(stated, tuple(expressions), "[model] units")
+    def _units(self, expressions: Mapping[str, Expression], units: Mapping[str, str]) -> dict[str, str]:
+        """Unit of each output: as stated, or derived where the expression determines it."""
+        found, stated = {}, self.table.model.units
+        if others := stated.keys() - expressions.keys():
+            raise self._refused(f"there is no output {min(others)!r}", "[model] units", "Give units of outputs alone")
         for name, expression in expressions.items():
-            if unit := self._text(stated, name, "[model] units"):
-                unit_of(unit, self._where(f"[model] units.{name}"))
-            if wrong := contradiction(expression, units, unit):
+            if unit := stated.get(name, ""):
+                input_keys.unit_of(unit, self._where(f"[model] units.{name}"))
+            if wrong := input_keys.contradiction(expression, units, unit):
                 raise self._refused(f"{name} {wrong}", "[model] outputs", "State inputs and output in units that fit")
             if not unit and any(units[used] not in ("", "1") for used in expression.names):
-                unit = derived_unit(expression, units) or ""
-            units[name] = unit
-        return Labels(units, _origins(given))
+                unit = input_keys.derived_unit(expression, units) or ""
+            found[name] = unit
+        return found
 
-
-def _origins(given: Mapping[str, Any]) -> dict[str, str]:
-    return {
-        name: keys.get("source") or (REPEATS if "samples" in keys else say("not stated"))
-        for name, keys in given.items()
-    }
+    def _origins(self) -> dict[str, str]:
+        return {
+            name: keys.source or (REPEATS if keys.samples is not None else say("not stated"))
+            for name, keys in self.table.inputs.items()
+        }

@@ -18,7 +18,6 @@ from pydantic import create_model
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.table import JobTable
-from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.maths.uncertainty.air.state import Air, Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
@@ -76,18 +75,8 @@ READY: Mapping[str, ReadyModel] = MappingProxyType(
 
 
 def ready_model(
-    model: Mapping[str, Any], inputs: Mapping[str, Distribution], units: Mapping[str, str], correlation: Correlations
+    ready: ReadyModel, inputs: Mapping[str, Distribution], units: Mapping[str, str], correlation: Correlations
 ) -> Built:
-    """The ready model that ``[model]`` of a file names, of the file's inputs."""
-    where = "[model] ready"
-    for key in ("outputs", "units"):
-        if key in model:
-            problem = f"{key} is given, and the ready model has its own"
-            raise CmmUqError(problem, where=where, fix="Leave one of them out")
-    name = model["ready"]
-    if not isinstance(name, str) or name not in READY:
-        raise CmmUqError(f"there is no ready model {name!r}", where=where, fix=suggestion(str(name), READY))
-    ready = READY[name]
     for key in inputs:
         if key not in ready.inputs:
             raise CmmUqError(f"{key!r} is no input of this model", fix=suggestion(key, ready.inputs))
@@ -102,11 +91,20 @@ def ready_model(
     return whole, labels
 
 
-KEY = "budget"
-
-
-class _BudgetFile(JobTable):
+class BudgetFile(JobTable):
     budget: BudgetTable
+
+    @classmethod
+    def named(cls, data: Mapping[str, Any], path: Path) -> type[BudgetFile] | None:
+        """The file whose budget is of the method that it names; ``None`` of a file without a budget."""
+        if "budget" not in data:
+            return None
+        table = data["budget"]
+        method = str(table.get("method", "")) if isinstance(table, dict) else ""
+        if method not in TABLES:
+            problem = f"there is no ready budget {method!r}" if method else "is missing"
+            raise CmmUqError(problem, where=f"{path}: [budget] method", fix=suggestion(method, TABLES))
+        return create_model("BudgetFile", __base__=cls, budget=(TABLES[method], ...))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +125,6 @@ class ReadyBudget:
 
     @property
     def descriptions(self) -> Mapping[str, Text]:
-        """The method, and further figures that it asks for."""
         remarks: dict[str, Text] = {
             Verbatim(name): number(value, ".6g") for name, value in self.table.remarks().items()
         }
@@ -141,7 +138,6 @@ class ReadyBudget:
         return Evaluation(Request("first", max(coverage), seed=seed or 0), stated, self.table.correlation(), Ways())
 
     def further(self) -> dict[str, Any]:
-        """Keys of results.json beside those of every budget."""
         return {"ready": getattr(self.table, "method", ""), **self.table.remarks()}
 
 
@@ -150,16 +146,3 @@ def _stated(budget: Budget) -> OutputResult:
     if budget.factor is not None:
         reason = say("U = k u with k = 2, which the standard prescribes")
     return OutputResult("first", reason, value, budget.u, budget.dof, (value - U, value + U), budget.k, budget)
-
-
-def read_ready_budget(content: bytes, path: Path) -> ReadyBudget:
-    def table_of(data: dict[str, Any]) -> type[_BudgetFile]:
-        table = data[KEY]
-        method = str(table.get("method", "")) if isinstance(table, dict) else ""
-        if method not in TABLES:
-            problem = f"there is no ready budget {method!r}" if method else "is missing"
-            raise CmmUqError(problem, where=f"{path}: [{KEY}] method", fix=suggestion(method, TABLES))
-        return create_model("BudgetFile", __base__=_BudgetFile, budget=(TABLES[method], ...))
-
-    budget = checked(content, path, table_of).budget
-    return ReadyBudget(budget.title or path.stem, budget, content)

@@ -17,26 +17,17 @@ from cmm_uq.maths.uncertainty.budgets.measurements import harris_compensated, ha
 from cmm_uq.maths.uncertainty.measurement_model import derivatives
 from cmm_uq.maths.uncertainty.quantity import MINUS
 from cmm_uq.maths.uncertainty.reference import jcgm
-from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase, figures
+from cmm_uq.maths.uncertainty.reference.jcgm import ReferenceCase, cases
 from cmm_uq.maths.uncertainty.type_a import correlation_of
 
 # °C, %, kPa, nm; 10⁹ (n − 1) by Ciddor and by the modified Edlén equation
 _AIR_TABLE = (
-    (20, 0, 101.325, 633, 271800, 271799),
-    (20, 0, 60, 633, 160924, 160920),
-    (20, 0, 120, 633, 321916, 321918),
-    (50, 0, 100, 633, 243285, 243270),
-    (5, 0, 100, 633, 282756, 282750),
-    (-40, 0, 100, 633, 337580, 337471),
-    (50, 100, 120, 633, 287924, 287864),
-    (40, 75, 120, 633, 299418, 299406),
-    (20, 100, 100, 633, 267394, 267394),
-    (40, 100, 110, 1700, 270247, 270237),
-    (20, 0, 101.325, 1700, 268479, 268483),
-    (40, 100, 110, 300, 289000, 288922),
-    (20, 0, 101.325, 300, 286581, 286579),
-    (-40, 0, 120, 300, 427233, 427072),
-)
+    (20, 0, 101.325, 633, 271800, 271799), (20, 0, 60, 633, 160924, 160920), (20, 0, 120, 633, 321916, 321918),
+    (50, 0, 100, 633, 243285, 243270), (5, 0, 100, 633, 282756, 282750), (-40, 0, 100, 633, 337580, 337471),
+    (50, 100, 120, 633, 287924, 287864), (40, 75, 120, 633, 299418, 299406), (20, 100, 100, 633, 267394, 267394),
+    (40, 100, 110, 1700, 270247, 270237), (20, 0, 101.325, 1700, 268479, 268483), (40, 100, 110, 300, 289000, 288922),
+    (20, 0, 101.325, 300, 286581, 286579), (-40, 0, 120, 300, 427233, 427072),
+)  # fmt: skip
 # °C, kPa; 10⁸ (n − 1)
 _DRY = ((20, 80, 21458.0), (20, 100, 26824.4), (20, 120, 32191.6), (10, 100, 27774.7), (30, 100, 25937.2))
 
@@ -95,43 +86,30 @@ _MEASUREMENTS = (
         {f"{t} °C, {kpa} kPa": (value, 0.05) for t, kpa, value in _DRY},
         lambda: [1e8 * air.ciddor(t, 1e3 * kpa, 0.0, 450.0, 633.0) for t, kpa, _ in _DRY],
     ),
-    ReferenceCase(
-        "Laboratory air by Ciddor and its sensitivities",
-        "recomputed with forty digits",
-        figures(
-            "(n − 1)·10⁸: 27137.275 ± 1e-3; dn/dt, /K: -9.548e-7 ± 5e-11; dn/dp, /Pa: 2.683e-9 ± 5e-13; "
-            "dn/dRH, /%: -8.50e-9 ± 5e-12; dn/dCO2, /ppm: 1.435e-10 ± 5e-14"
-        ),
+    *cases(
+        """
+        Laboratory air by Ciddor and its sensitivities | recomputed with forty digits
+        (n − 1)·10⁸: 27137.275 ± 1e-3; dn/dt, /K: -9.548e-7 ± 5e-11; dn/dp, /Pa: 2.683e-9 ± 5e-13;
+        dn/dRH, /%: -8.50e-9 ± 5e-12; dn/dCO2, /ppm: 1.435e-10 ± 5e-14
+
+        Constant of water vapour | Birch and Downs, Metrologia 31 (1994) 315
+        constant: 3.7345 ± 1e-9
+
+        Refractivity by the formula of Harris 2004, exponent mended | Harris 2004 section 3.3, recomputed
+        N: 271.307 ± 5e-4; dN/dT: -0.958 ± 5e-4; dN/dP: 0.358 ± 5e-4; dN/dH: -0.0096 ± 5e-5
+
+        Sphere from 17,000 points on a hemisphere, 9 µm each | information matrix in closed form
+        u(x), µm: 0.120 ± 1e-3; u(y), µm: 0.120 ± 1e-3; u(z), µm: 0.240 ± 1e-3; u(R), µm: 0.138 ± 1e-3;
+        r(z,R): -0.866 ± 1e-3
+
+        Ballbar length as printed | Harris 2004 sections 6.2.3 and 6.4.1
+        centre, µm: 14 ± 0.6; length, compensated, µm: 20 ± 1; length, 20 °C, µm: 26 ± 0.5; length, 25 °C, µm: 41 ± 0.5;
+        length, 30 °C, µm: 52 ± 0.5
+        """,
         _laboratory_air,
-    ),
-    ReferenceCase(
-        "Constant of water vapour",
-        "Birch and Downs, Metrologia 31 (1994) 315",
-        figures("constant: 3.7345 ± 1e-9"),
         _water_constant,
-    ),
-    ReferenceCase(
-        "Refractivity by the formula of Harris 2004, exponent mended",
-        "Harris 2004 section 3.3, recomputed",
-        figures("N: 271.307 ± 5e-4; dN/dT: -0.958 ± 5e-4; dN/dP: 0.358 ± 5e-4; dN/dH: -0.0096 ± 5e-5"),
         _harris_air,
-    ),
-    ReferenceCase(
-        "Sphere from 17,000 points on a hemisphere, 9 µm each",
-        "information matrix in closed form",
-        figures(
-            "u(x), µm: 0.120 ± 1e-3; u(y), µm: 0.120 ± 1e-3; u(z), µm: 0.240 ± 1e-3; u(R), µm: 0.138 ± 1e-3; "
-            "r(z,R): -0.866 ± 1e-3"
-        ),
         _hemisphere,
-    ),
-    ReferenceCase(
-        "Ballbar length as printed",
-        "Harris 2004 sections 6.2.3 and 6.4.1",
-        figures(
-            "centre, µm: 14 ± 0.6; length, compensated, µm: 20 ± 1; length, 20 °C, µm: 26 ± 0.5; "
-            "length, 25 °C, µm: 41 ± 0.5; length, 30 °C, µm: 52 ± 0.5"
-        ),
         _harris,
     ),
 )
@@ -156,7 +134,6 @@ class SelfTestResult:
 
 
 def run(cases: Iterable[ReferenceCase] = REFERENCE_CASES) -> list[SelfTestResult]:
-    """Compute every figure of the reference cases and compare it."""
     return [
         SelfTestResult(f"{case.title}: {name}", expected, tolerance, float(got), case.source)
         for case in cases

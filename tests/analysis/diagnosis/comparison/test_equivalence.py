@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.comparison.equivalence import EquivalentSet, equivalent_sets
+from cmm_uq.analysis.diagnosis.comparison.equivalence import AlternativeSet, alternative_sets
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search
 from cmm_uq.artefacts import artefact_facts
@@ -28,11 +28,10 @@ def searched(effect: str, size: float, length: float | None = None) -> SearchRes
     return search(RecordingModel(Ballbar(facts, read), ()), None, alpha=0.01, seed=1)
 
 
-def sets_of(found: SearchResult) -> dict[tuple[str, ...], EquivalentSet]:
+def sets_of(found: SearchResult) -> dict[tuple[str, ...], AlternativeSet]:
     assert found.combinations is not None
-    every = found.first.explanations
-    sets = equivalent_sets(found.first.comparison, found.combinations, found.chosen, found.versions)
-    return {tuple(sorted(str(every[i].name) for i in one.members)): one for one in sets}
+    sets = alternative_sets(found.first.comparison, found.combinations, found.chosen, found.versions)
+    return {tuple(sorted(one.effects)): one for one in sets}
 
 
 @pytest.fixture(scope="module")
@@ -71,11 +70,13 @@ def test_every_set_can_be_the_effect_as_far_as_it_is_said_to(stretched: SearchRe
     shows = projected((index,), comparison.left)
     left = comparison.left - shows
     variance = float(left @ left) / (comparison.degrees_of_freedom - 1)
+    numbers = {str(explanation.name): i for i, explanation in enumerate(every)}
     for one in sets_of(stretched).values():
-        assert one.instead_of == (index,)
-        missed = shows - projected(one.members, shows)
+        assert one.instead_of == (every[index].name,)
+        members = tuple(numbers[name] for name in one.effects)
+        missed = shows - projected(members, shows)
         assert np.log(one.odds) == pytest.approx(float(missed @ missed) / (2 * variance), abs=1e-6)
-        for fewer in combinations(one.members, len(one.members) - 1):
+        for fewer in combinations(members, len(members) - 1):
             part = shows - projected(fewer, shows) if fewer else shows
             assert part @ part > 2 * (missed @ missed)
 
