@@ -145,7 +145,13 @@ def by_standard(statement: Statement) -> Verdict:
 
 
 def by_tolerance(
-    name: str, title: Text, quantity: Quantity, tolerance: float, *, determined: bool = True, against: Sequence[Text] = ()
+    name: str,
+    title: Text,
+    quantity: Quantity,
+    tolerance: float,
+    *,
+    determined: bool = True,
+    against: Sequence[Text] = (),
 ) -> Verdict:
     """A parameter, named as ``scale_x.ppm`` and in words, against its tolerance by its whole 95 % interval (ISO 14253-1).
 
