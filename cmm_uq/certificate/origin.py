@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import PurePosixPath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
@@ -21,10 +21,12 @@ from cmm_uq.base.plugins import KINDS, STANDARDS, versions
 from cmm_uq.certificate.document import Document, Table, table
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED, Origin
-from cmm_uq.laboratory.records.facts import ChainHead
 from cmm_uq.machine.physics.catalogue import plugins
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.uncertainty.quantity import Quantity
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.records.facts import ChainHead
 
 BANNERS = {
     SIMULATED: say("SIMULATED RECORDING, not a calibration certificate"),

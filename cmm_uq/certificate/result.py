@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
 from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
-from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistakes
-from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
 from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.analysis.machine.state import of_machine
-from cmm_uq.analysis.planning.set_up import NextPlan, Suggestion
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, at_key, say
@@ -38,6 +34,12 @@ from cmm_uq.maths.inference.linear_model import LeastSquares
 from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.type_a import Covariance, factor_of_noise
+
+if TYPE_CHECKING:
+    from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
+    from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
+    from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
+    from cmm_uq.analysis.planning.set_up import NextPlan, Suggestion
 
 AtLeast = Callable[..., tuple[float, float]]  # U and k as a certificate states them; see StatedUncertainty.raised_to
 

@@ -11,8 +11,8 @@ import numpy as np
 from pydantic import create_model
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.base.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit
-from cmm_uq.base.files.toml_file import checked
+from cmm_uq.base.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit, text_of
+from cmm_uq.base.files.toml_file import checked, toml_of
 from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
@@ -48,6 +48,14 @@ if TYPE_CHECKING:
 WHOLE = (".pdf", ".xml")  # a certificate with its inputs inside
 CERTIFICATES = tuple(f"certificate{origin}.pdf" for origin in ("", f"-{SIMULATED}", f"-{COMPENSATED}"))
 PART = "part"  # the table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`
+
+
+def is_part(content: bytes) -> bool:
+    """Whether a job.toml is of a part."""
+    try:
+        return PART in toml_of(text_of(content, ""), "")
+    except (CmmUqError, ValueError):
+        return False
 
 
 @dataclass(frozen=True)

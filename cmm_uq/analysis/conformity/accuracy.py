@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.screening.screening import counted_with
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Ints
@@ -29,6 +29,9 @@ from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.uncertainty.quantity import Quantity, averaged
+
+if TYPE_CHECKING:
+    from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 
 TITLES: Mapping[str, Text] = {
     "mean_length_mm": say("Mean length"),

@@ -11,6 +11,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from cmm_uq import __version__
 from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, records
 from cmm_uq.app.cli.options import examples, flag, with_ending
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
@@ -143,8 +144,6 @@ cmm-uq --help lists all commands, cmm-uq COMMAND --help the options of one."""
 
 @app.callback(invoke_without_command=True)
 def _alone(context: typer.Context, version: bool = flag(False, "--version", "Print the version and stop.")) -> None:
-    from cmm_uq import __version__
-
     if version:
         say(f"cmm-uq {__version__}")
         raise typer.Exit

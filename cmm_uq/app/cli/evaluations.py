@@ -9,6 +9,7 @@ from pathlib import Path
 
 import typer
 
+from cmm_uq import __version__
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.jobs import show_imported
 from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
@@ -213,7 +214,6 @@ def selftest(
     json: bool = opt.JSON,
 ) -> None:
     """Compute published reference figures and compare: expected, got, source. Exit code 4 when any differs."""
-    from cmm_uq import __version__
     from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
     from cmm_uq.certificate.wording import Headline, Summary
     from cmm_uq.maths.uncertainty.reference.selftest import as_text, run

@@ -15,6 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import NOTHING, Text
 from cmm_uq.base.output import Ledger, Owner, staged
+from cmm_uq.certificate.document import translated as said
 from cmm_uq.certificate.origin import as_json, file_name, made_after, marked
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.result import Outcome
@@ -22,6 +23,7 @@ from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
 from cmm_uq.laboratory.records.facts import KEY, Heads
+from cmm_uq.laboratory.records.opening import open_records
 from cmm_uq.laboratory.records.place import NONE, is_url, of_folder, place_of
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
@@ -46,8 +48,6 @@ def opened(
     if place is None or not (make or is_url(place) or Path(place).exists()):
         yield None
         return
-    from cmm_uq.laboratory.records.opening import open_records
-
     with open_records(place, create=create) as records:
         yield records
 
@@ -193,7 +193,6 @@ class Form:
         data, line = results_at(outcome.results, heads) if self.recorded else (as_json(outcome.results), NOTHING)
         if results_only:
             return {RESULTS: data}
-        from cmm_uq.certificate.document import translated as said
         from cmm_uq.certificate.render import render_html, render_pdf
         from cmm_uq.certificate.results.provenance import FILE, provenance
 

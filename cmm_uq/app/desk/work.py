@@ -42,7 +42,7 @@ from cmm_uq.base.output.interruption import done, watch
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.verify.given import CHECKS
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.job import is_part
+from cmm_uq.jobs.reading import is_part
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.laboratory.records.place import is_url, of_folder, place_of
 

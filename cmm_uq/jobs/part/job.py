@@ -11,7 +11,7 @@ from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES, text_of
-from cmm_uq.base.files.toml_file import checked, toml_of
+from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.logo import checked_logo
@@ -20,7 +20,7 @@ from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.part.values import Reported, reported_values
-from cmm_uq.jobs.reading import CERTIFICATES, PART, WHOLE, further_named, job_toml
+from cmm_uq.jobs.reading import CERTIFICATES, WHOLE, further_named, job_toml
 from cmm_uq.jobs.source import RESULTS, FilesInFolder, FilesInMemory, JobFiles
 from cmm_uq.jobs.tables.identification import check_examples, check_mark
 
@@ -47,14 +47,6 @@ class PartJob:
     def machine_files(self) -> Mapping[str, bytes]:
         """Those of the inputs that state the machine: its certificate or results, and the draws of its errors."""
         return {name: self.inputs[name] for name in self.stated_by}
-
-
-def is_part(content: bytes) -> bool:
-    """Whether a job.toml is of a part."""
-    try:
-        return PART in toml_of(text_of(content, ""), "")
-    except (CmmUqError, ValueError):
-        return False
 
 
 def read_part(folder: Path, *, machine: bool = True) -> PartJob:

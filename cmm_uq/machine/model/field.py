@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -130,12 +131,14 @@ def as_read(effect: Effect, largest_um: float, errors: Sequence[Sequence[tuple[f
     return found
 
 
+@cache
 def curves() -> tuple[AxisFunction, ...]:
     """Of a machine of three axes."""
     each = [one for one in EVERY.values() if isinstance(one, Family) and family_of(one) in ALLOWED]
     return tuple(AxisFunction(one, long=long) for one in each for long in (True, False))
 
 
+@cache
 def allowed(family: str) -> tuple[float, str]:
     """Root mean square of an error of a family that physics allows, and its unit; of play the gap; one of what is stated."""
     if family.endswith(STATED):

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,16 +20,13 @@ from cmm_uq.analysis.machine.conditional import further_recording, given_recordi
 from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.regions import other_errors
 from cmm_uq.analysis.machine.state import Change, MachineState, StatedNoise, changes, of_machine, with_curves
-from cmm_uq.app.commands.certificates.verification import Computing, Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import doubt_of, with_noise
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, after, day, number, say
 from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificate, FurtherCertificates
-from cmm_uq.certificate.verify.given import given_of
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import FurtherFacts
 from cmm_uq.machine.model.artefact_doubt import causes_of
@@ -36,6 +34,10 @@ from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.stated import with_own_physics
 from cmm_uq.maths.inference.families import BRIEF
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.certificates.verification import Computing, Verification
+    from cmm_uq.jobs.part.job import PartJob
 
 # quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
 # show of errors left out. Those of all further recordings together.
@@ -65,12 +67,15 @@ def verify_further(
     job: PartJob | Job, computing: Computing | None = None, *, trust: Iterable[Path] | None = None
 ) -> Iterable[tuple[str, Verification]]:
     """The verification of each further certificate of a job, by the name of its file; ``computing``: again, if at all."""
+    if not job.further:
+        return
+    from cmm_uq.app.commands.certificates.verification import examine_certificate, verify_given
+    from cmm_uq.certificate.verify.given import given_of
+
     trusted, examine = None if trust is None else tuple(trust), partial(examine_certificate, computing=computing)
     for name in job.further:
-        yield (
-            name,
-            verify_given(given_of({name: job.inputs[name]}), examine, rerun=computing is not None, trust=trusted),
-        )
+        given = given_of({name: job.inputs[name]})
+        yield name, verify_given(given, examine, rerun=computing is not None, trust=trusted)
 
 
 def further_certificates(
@@ -140,7 +145,7 @@ def _refuse_other(own: Job, calibrated: Job, job: PartJob | Job, refuse: Callabl
         if (one := getattr(here, key)) != (other := getattr(there, key)):
             problem = f"is of another {what}: {one}, where the machine's certificate has {other}"
             raise refuse(problem, fix="Give certificates of the machine that measured the part")
-    if own.facts.job.date > (on := job.facts.job.date) and isinstance(job, PartJob):
+    if own.facts.job.date > (on := job.facts.job.date) and not isinstance(job, Job):
         raise refuse(f"is of {own.facts.job.date}, after the part was measured on {on}", fix="Leave it out")
     if own.origin != calibrated.origin and SIMULATED in (own.origin, calibrated.origin):
         problem = f"is of a recording that is {own.origin}, and that of the machine is {calibrated.origin}"

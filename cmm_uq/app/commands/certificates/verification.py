@@ -172,9 +172,7 @@ def job_of_inputs(
     inquiry: Inquiry, given: Given, read: Callable[[Mapping[str, bytes], Mapping[str, Any]], _T], further: str
 ) -> _T | None:
     """The job of sound inputs, read with results.json; ``further``: what besides computing again needs them."""
-    from cmm_uq.certificate.verify.sources import inputs_of
-
-    inputs = inputs_of(inquiry, given)
+    inputs = sources.inputs_of(inquiry, given)
     if inputs is None or given.results is None:
         inquiry.left(f"{further} and {AGAIN}", "the inputs are not there as results.json names them")
         return None

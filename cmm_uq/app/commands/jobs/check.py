@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.analysis.conformity.standards import decidable
-from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
 from cmm_uq.app.commands.estimation import decision
 from cmm_uq.app.commands.model import recorded_model, refuse_unmeasured
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
+from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
@@ -29,8 +29,7 @@ from cmm_uq.certificate.clauses import Requirement, certifies, clauses, contradi
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import is_own, read_recording
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.job import is_part, read_part
-from cmm_uq.jobs.reading import PART
+from cmm_uq.jobs.reading import PART, is_part
 from cmm_uq.jobs.source import inside
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.machine.physics.catalogue import effects
@@ -188,6 +187,7 @@ def _check_part(folder: Path, path: Path) -> JobCheck:
     from cmm_uq.analysis.parts.reported import measured_of
     from cmm_uq.analysis.parts.setup import refuse_out_of_reach, refuse_unfit
     from cmm_uq.app.commands.parts.machine import refuse_machine
+    from cmm_uq.jobs.part.job import read_part
 
     wrong, warnings, job = Gathered(), list[Problem](), None
     with wrong.going_on():
@@ -237,8 +237,11 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     for i, _ in enumerate(facts.conformity, 1):
         with wrong.going_on():
             decision(job, model, findings, i)
-    with wrong.going_on():
-        further_certificates(job, job, verify_further(job))
+    if job.further:
+        from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
+
+        with wrong.going_on():
+            further_certificates(job, job, verify_further(job))
     lines = ((one, one.lines[0] if one.lines else None) for one in findings)
     return [Problem(str(one.why), job.recording_path, line, one.column or "") for one, line in lines]
 
@@ -292,8 +295,6 @@ def _placed(error: CmmUqError, path: Path) -> CmmUqError:
 
 def _line_of(key: str, text: str) -> int | None:
     """Line of a key such as ``[artefact] u_um``, or of its table."""
-    from cmm_uq.base.files.toml_file import line_of
-
     found, entry = _TABLE_KEY.match(key), re.match(r"\[\[\w+\]\] (\d+) ?(\w*)", key)
     if found is None:
         return None
