@@ -18,11 +18,10 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
 from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalModel, best_known, empirical_model
-from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement, thin_out
+from cmm_uq.analysis.diagnosis.held_out import Improvement, RepeatComparison, against_repeats, improvement, thin_out
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, WithheldEffect, joint_posterior
 from cmm_uq.analysis.diagnosis.location import Place, locate
 from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
-from cmm_uq.analysis.diagnosis.verdict import RepeatComparison, against_repeats, exceeds, verdict_of
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -247,12 +246,14 @@ def diagnose(
     most = np.argsort(-first.probability)[:12]
     rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
     repeats, wrong = against_repeats(found.model), first.p_value < alpha
-    doubtful = bool(found.rough) or found.unexplained > _UNKNOWN or exceeds(repeats, alpha) or beside
+    shared = repeats is not None and repeats.p_value < alpha
+    doubtful = bool(found.rough) or found.unexplained > _UNKNOWN or shared or beside
     empirical = empirical_model(found) if wrong and (doubtful or not found.effects) else None
     modelled = empirical is not None and empirical.predicts
-    verdict = "undetermined" if exceeds(repeats, alpha) else "consistent"
+    verdict = "undetermined" if shared else "consistent"
     if wrong:
-        verdict = verdict_of(named=bool(found.effects), doubtful=doubtful, modelled=modelled)
+        named, unnamed = "partial" if doubtful else "explained", "empirical" if modelled else "unexplained"
+        verdict = named if found.effects else unnamed
     return Diagnosis(
         verdict, first.p_value, alpha, locate(first, alpha, found.chosen), left_out(found, joint, model),
         indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,

@@ -15,7 +15,6 @@ from cmm_uq.analysis.diagnosis.empirical.model import ODDS, EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistake, SimulationMistakes
-from cmm_uq.analysis.diagnosis.verdict import exceeds
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, lines, number, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.sections import region_words
@@ -123,7 +122,7 @@ def stated_functions(d: Diagnosis) -> str:
 def repeats_words(d: Diagnosis) -> Text:
     """What repeats of a quantity share, beside their scatter, where that is more than noise leaves."""
     one = d.repeats
-    if one is None or not exceeds(one, d.alpha):
+    if one is None or one.p_value >= d.alpha:
         return NOTHING
     told = say(
         "What readings of one quantity share is {shared} µm; they scatter by {own} µm (F test, p = {p}).",

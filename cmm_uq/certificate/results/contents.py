@@ -19,7 +19,6 @@ from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
 from cmm_uq.analysis.diagnosis.smallest import PLACES, SmallestEffect
-from cmm_uq.analysis.diagnosis.verdict import exceeds
 from cmm_uq.analysis.planning.set_up import NextPlan
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.languages.translation import ENGLISH
@@ -152,7 +151,7 @@ def _beyond_effects(d: Diagnosis) -> dict[str, Any]:
     """What repeats share, the best known effect and the functions that were fitted, each where it is."""
     repeats, best, empirical = d.repeats, d.best_known, d.empirical
     found: dict[str, Any] = {}
-    if repeats is not None and exceeds(repeats, d.alpha):
+    if repeats is not None and repeats.p_value < d.alpha:
         found["repeats"] = asdict(repeats)
     if best is not None:
         found["best_known"] = {name: getattr(best, name) for name in ("effect", "probability", "odds_of_function")}

@@ -42,7 +42,8 @@ def test_an_effect_is_named_from_four_in_five_with_what_could_stand_in_its_place
     part = 0.6 * probability
     start = found_with(((0,), part), ((1,), probability - part), ((), 1 - probability), chosen=frozenset({0}))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("cmm_uq.analysis.diagnosis.asserted._fit", lambda _found: None)
+        patched.setattr("cmm_uq.analysis.diagnosis.asserted.families_of", lambda _found: [])
+        patched.setattr("cmm_uq.analysis.diagnosis.asserted.FunctionFit.of", lambda *_: None)
         patched.setattr("cmm_uq.analysis.diagnosis.joint.effect_of", lambda _one: effects(("play_x_y",))[0])
         gone, beside = doubted(start)
     assert (set(gone), beside) == (set() if named else {0}, False)

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from cmm_uq.analysis.diagnosis.diagnosis import diagnose
-from cmm_uq.analysis.diagnosis.verdict import RepeatComparison, against_repeats
+from cmm_uq.analysis.diagnosis.held_out import RepeatComparison, against_repeats
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Floats, Machine, Points

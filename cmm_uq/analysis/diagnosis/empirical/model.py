@@ -1,10 +1,10 @@
 """What was located and no effect names, modelled: functions of what is recorded, averaged by their evidence, and their form.
 
 y = B·b + F·a + ε, with b free (the job's model, what was asserted, where the artefact stands), F the columns of one function
-and ε the noise that the comparison found most probable. Functions are smooth (Gaussian processes) or have a form of
-:mod:`~cmm_uq.analysis.diagnosis.empirical.forms`; sizes are spread evenly in their logarithm up to what physics allows, and
-σ is integrated over. Held-out set-ups are predicted by all functions as the other set-ups alone weigh them: the choice is
-made anew wherever it is judged. A further function is looked for beside the most probable one where it has odds of 20 : 1.
+and ε the noise that the comparison found most probable. Functions are smooth (Gaussian processes) or of closed form; sizes
+are spread evenly in their logarithm up to what physics allows, and σ is integrated over. Held-out set-ups are predicted by all
+functions as the other set-ups alone weigh them: the choice is made anew wherever it is judged. A further one is looked for
+beside the most probable function where it has odds of 20 : 1.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, U
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical import evidence
-from cmm_uq.analysis.diagnosis.empirical.forms import SMOOTH
-from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm, families_of
+from cmm_uq.analysis.diagnosis.empirical.functions import SMOOTH, FunctionTerm, families_of
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text

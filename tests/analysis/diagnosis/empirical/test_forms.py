@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.empirical.forms import ClosedForm, forms_of
+from cmm_uq.analysis.diagnosis.empirical.functions import ClosedForm, forms_of
 
 RANDOM = np.random.default_rng(20261129)
 COVARIATE = np.sort(RANDOM.uniform(-40.0, 860.0, 60))
