@@ -31,7 +31,7 @@ from cmm_uq.app.commands.certificates.release import release
 from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.laboratory.batch_jobs import COLUMNS, conforming, rows
 from cmm_uq.app.commands.laboratory.due import _members, due_in, history_of
-from cmm_uq.app.serve.certificate_page import _notices
+from cmm_uq.app.serve.certificate_page import decided_words
 from cmm_uq.app.serve.view import by_rule, groups
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.certificate import certified
@@ -313,7 +313,7 @@ def test_the_pages_of_the_records(seed: int, recorded: Callable[[int], Records])
     assert ("overdue" in found) == (of.standing == "bad")
     assert ("failing" in found, "open" in found) == (of.standing == "bad", of.standing == "open")
     (kept,) = records.certificates()
-    said = str(_notices(kept)[-1].head)
+    said = str(decided_words(kept)[0])
     assert ("states no conformity" in said) if of.overall == "none" else (f"decision: {of.overall}" in said)
 
 

@@ -109,16 +109,13 @@ def effects(
     from cmm_uq.app.commands.forms import listed_effects
 
     found = listed_effects(word, job)
-    if end.json:
-        put_data({"effects": found})
-        return
     said = {"parameters": "prior", "columns": "needs", "mechanism": "lies in", "points_to": "points to"}
     rows: list[tuple[str, str]] = []
     for each in found:
-        rows.append((each.pop("name"), each.pop("title")))
-        if word:
-            rows += [("", f"{said.get(key, key)}: {text}") for key, text in each.items() if text]
-    show(screen_layout(verbose=True).table(rows))
+        rows.append((each["name"], each["title"]))
+        further = {key: text for key, text in each.items() if text and key not in ("name", "title")} if word else {}
+        rows += [("", f"{said.get(key, key)}: {text}") for key, text in further.items()]
+    end.put({"effects": found}, screen_layout(verbose=True).table(rows))
 
 
 def plan(

@@ -8,23 +8,20 @@ from __future__ import annotations
 import getpass
 import ipaddress
 import threading
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.options import Ending, argument, flag, option
-from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of, screen_layout, show_summary
-from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, Line, can_answer, put_data, say, say_now, show
+from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of, screen_layout, summary_lines
+from cmm_uq.app.cli.terminal import BAD_INPUT, Line, can_answer, say, say_now
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import check_permitted
 from cmm_uq.base.output.interruption import keeping
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.laboratory.batch import Batch
-    from cmm_uq.certificate.wording import Summary
 
 LATER_S = 0.7  # s after which the worker is begun
 
@@ -74,10 +71,7 @@ def desk(
         later = threading.Timer(LATER_S, place.begin)  # the first page first
         later.daemon = True
         later.start()
-        if open_:
-            import webbrowser
-
-            threading.Thread(target=webbrowser.open, args=(link,), daemon=True).start()
+        _browse(link, open_)
         try:
             server.serve_forever()
         finally:
@@ -102,6 +96,13 @@ def _password() -> str:
     if first != second:
         raise CmmUqError("both are not the same", where="password", fix="Type it again")
     return first
+
+
+def _browse(url: str, wanted: bool) -> None:
+    if wanted:
+        import webbrowser
+
+        threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
 
 def _loopback(bind: str) -> bool:
@@ -170,17 +171,11 @@ def batch(
 
         options = BatchOptions(workers, scheduler, results_only, seed, resume, end.force, time_limit, tries)
         done = write_batch(folders, out, options, parquet=parquet, stage=stage, records=records)
-    if end.json:
-        put_data(done.as_data())
-    elif not end.quiet:
-        show(screen_layout(verbose=end.verbose).screen(_batch_summary(done, None if end.verbose else FAILED_SHOWN)))
-    if done.failed:
-        raise typer.Exit(BAD_INPUT)
-    if end.strict and done.not_conforming:
-        raise typer.Exit(NOT_CONFORMING)
+    lines = _batch_lines(done, verbose=end.verbose)
+    end.put(done.as_data(), lines, BAD_INPUT if done.failed else 0, bool(done.not_conforming))
 
 
-def _batch_summary(batch: Batch, most: int | None) -> Summary:
+def _batch_lines(batch: Batch, *, verbose: bool) -> Iterator[Line]:
     """What came of it, and which jobs failed, the first of them or all."""
     from cmm_uq.base.messages import Text, Verbatim, plural, say
     from cmm_uq.certificate.wording import Headline, Summary
@@ -203,10 +198,11 @@ def _batch_summary(batch: Batch, most: int | None) -> Summary:
         one = say("1 process ended over a job, which was then given to another.")
         many = say("{count} processes ended over a job, which was then given to another.", count=batch.ended)
         remarks.append(plural(batch.ended, one=one, many=many))
-    warnings: list[Text] = [Verbatim(each) for each in batch.failed[:most]]
+    warnings: list[Text] = [Verbatim(each) for each in batch.failed[: None if verbose else FAILED_SHOWN]]
     if more := len(batch.failed) - len(warnings):
         warnings.append(say("{more} more failed; --verbose names them all, --json as data.", more=more))
-    return Summary(verdicts=(verdict,), remarks=tuple(remarks), warnings=tuple(warnings))
+    summary = Summary(verdicts=(verdict,), remarks=tuple(remarks), warnings=tuple(warnings))
+    yield from screen_layout(verbose=verbose).screen(summary)
 
 
 def due(
@@ -225,17 +221,17 @@ def due(
 
     found = what_is_due(records, machines or (), on=opt.day_of(on), within=opt.time_of(within), fleet=fleet)
     files = {} if out is None else write_due(found, out, force=end.force)
-    if end.json:
-        put_data(found.data())
-    elif not end.quiet:
+
+    def lines() -> Iterator[Line]:
         from cmm_uq.certificate.pages.fleet import counts, due_row
 
         text, standing = counts(found.items, found.on, found.within)
-        head = ((f"{found.on.isoformat()}: ", HEADING), (text, COLOURS[standing]))
+        yield (f"{found.on.isoformat()}: ", HEADING), (text, COLOURS[standing])
         # every reason whole: a list that says why is what is asked for
-        _show_table(head, [due_row(one, found.on, found.within) for one in found.items], (), files, verbose=True)
-    if end.strict and found.of("overdue"):
-        raise typer.Exit(NOT_CONFORMING)
+        yield from screen_layout(verbose=True).table(due_row(one, found.on, found.within) for one in found.items)
+        yield from _written(files)
+
+    end.put(found.data(), lines(), strict=bool(found.of("overdue")))
 
 
 def fleet(
@@ -254,12 +250,8 @@ def fleet(
 
         found = fleet(records, name or (), seed=seed, stage=stage)
         files = {} if out is None else write_fleet(found, out, force=end.force)
-    if end.json:
-        put_data(fleet_data(found))
-    elif not end.quiet:
-        show_summary(fleet_summary(found), files, verbose=end.verbose)
-    if end.strict and found.outsiders:
-        raise typer.Exit(NOT_CONFORMING)
+    lines = () if end.silent else summary_lines(fleet_summary(found), files, verbose=end.verbose)
+    end.put(fleet_data(found), lines, strict=bool(found.outsiders))
 
 
 def history(
@@ -276,23 +268,22 @@ def history(
 
     found = history_of(machine, records, on=opt.day_of(on), fleet=fleet)
     files = {} if out is None else write_history(found, out, force=end.force)
-    if end.json:
-        put_data(history_data(found))
-    elif not end.quiet:
+
+    def lines() -> Iterator[Line]:
         serial = "" if found.machine.by_name else f", serial number {found.machine.serial}"
         count = len(found.certificates)
         recordings = "one recording" if count == 1 else f"{count} recordings"
-        head = ((f"{found.machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", ""))
-        notes: list[Line] = [((terminal_note(found), ""),)] if found.values else []
-        notes += [((text, COLOURS["open"]),) for text in (*step_notes(found), *found.remarks)]
-        _show_table(head, [summary_row(found, one) for one in found.values], notes, files, verbose=end.verbose)
+        yield (f"{found.machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", "")
+        yield from screen_layout(verbose=end.verbose).table(summary_row(found, one) for one in found.values)
+        yield from [((terminal_note(found), ""),)] if found.values else []
+        yield from (((text, COLOURS["open"]),) for text in (*step_notes(found), *found.remarks))
+        yield from _written(files)
+
+    end.put(history_data(found), lines())
 
 
-def _show_table(
-    head: Line, rows: Iterable[Sequence[str]], notes: Iterable[Line], files: dict[str, Path], *, verbose: bool
-) -> None:
-    written = [(("Written to ", HEADING), (folder_of(files), ""))] if files else []
-    show([head, *screen_layout(verbose=verbose).table(rows), *notes, *written])
+def _written(files: dict[str, Path]) -> list[Line]:
+    return [(("Written to ", HEADING), (folder_of(files), ""))] if files else []
 
 
 def serve(
@@ -318,20 +309,17 @@ def serve(
         put_account(accounts, add_account)
         return
     context = own.tls_of(tls, tls_key, accounts)
-    site = pages.Site(records, account=accounts is not None)
+    site = pages.Site(records)
     with (
         http.RecordsServer(site.answer, bind, port, name or (), context) as server,
         keeping(lambda: "the page is closed"),
     ):
         if accounts is not None:
-            server.answer = own.Accounts(accounts, server.server_port, say_now).around(site.answer)
+            site.guard = own.Accounts(accounts, server.server_port, say_now)
         if not quiet:
             say_now(f"{site.place} at {server.url} until Ctrl-C")
             if not server.alone and accounts is None:
                 say_now("Whoever reaches this address can read the records: there are no passwords")
         threading.Thread(target=site.warm, daemon=True).start()
-        if open_:
-            import webbrowser
-
-            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+        _browse(server.url, open_)
         server.serve_forever()

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import typer
 
-from cmm_uq.app.cli.terminal import on_terminal, progress, put_data, say
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, Line, on_terminal, progress, put_data, say, show
 from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.languages.translation import Code
 
@@ -122,14 +122,17 @@ class Ending(NamedTuple):
     def progress(self) -> AbstractContextManager[Stage]:
         return progress(quiet=self.silent, verbose=self.verbose)
 
-    def put(self, data: Mapping[str, Any], lines: Iterable[str], code: int = 0) -> None:
-        """The data where JSON is asked for, else the lines; then the exit code."""
+    def put(self, data: Mapping[str, Any], lines: Iterable[str | Line], code: int = 0, strict: bool = False) -> None:
+        """The data where JSON is asked for, else the lines; then the exit code, or that of what is not to be where strict."""
         if self.json:
             put_data(data)
         for line in () if self.silent else lines:
-            say(printable(line))
-        if code:
-            raise typer.Exit(code)
+            if isinstance(line, str):
+                say(printable(line))
+            else:
+                show([line])
+        if code or (self.strict and strict):
+            raise typer.Exit(code or NOT_CONFORMING)
 
 
 def ending(

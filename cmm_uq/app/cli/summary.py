@@ -181,9 +181,11 @@ def folder_of(files: Mapping[str, Path]) -> str:
     return next((str(path.parent) for name, path in files.items() if "/" not in name), "")
 
 
-def show_summary(summary: Summary, files: Mapping[str, Path], verbose: bool, name: str = "", banner: str = "") -> None:
+def summary_lines(
+    summary: Summary, files: Mapping[str, Path], verbose: bool, name: str = "", banner: str = ""
+) -> list[Line]:
     rows, folder = file_rows(files, whole=verbose), folder_of(files)
-    show(screen_layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder))
+    return screen_layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder)
 
 
 def conclude(result: Written[Any], end: Ending) -> None:
@@ -194,7 +196,7 @@ def conclude(result: Written[Any], end: Ending) -> None:
         from cmm_uq.certificate.origin import BANNERS
 
         banner = BANNERS.get(result.origin, "")
-        show_summary(result.summary, result.files, verbose=end.verbose, name=result.name, banner=banner)
+        show(summary_lines(result.summary, result.files, end.verbose, result.name, banner))
         if result.recorded:
             say(result.recorded)
     if end.strict and not result.conforming:
@@ -212,7 +214,7 @@ def conclude_derived(
         from cmm_uq.certificate.wording import Summary
 
         further = (say("Next: cmm-uq report {folder}", folder=Verbatim(folder_of(files))),) if is_job else ()
-        show_summary(Summary(Verbatim(what), remarks=(*map(Verbatim, remarks), *further)), files, verbose=end.verbose)
+        show(summary_lines(Summary(Verbatim(what), remarks=(*map(Verbatim, remarks), *further)), files, end.verbose))
 
 
 def put_manifest(files: Mapping[str, Path]) -> None:

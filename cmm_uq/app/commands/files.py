@@ -38,7 +38,7 @@ _UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")
 
 @contextlib.contextmanager
 def opened(
-    where: str | Path | None, out: Path | None, *, make: bool = True, create: bool = True
+    where: str | Path | None, out: Path | None, *, make: bool = True, create: bool = True, read_only: bool = False
 ) -> Iterator[Records | None]:
     """The records of a command; ``None`` where there are to be none, or are none and none are to be made.
 
@@ -48,7 +48,7 @@ def opened(
     if place is None or not (make or is_url(place) or Path(place).exists()):
         yield None
         return
-    with open_records(place, create=create) as records:
+    with open_records(place, create=create, read_only=read_only) as records:
         yield records
 
 

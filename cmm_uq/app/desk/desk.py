@@ -12,45 +12,52 @@ from dataclasses import replace
 from functools import partial
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cmm_uq import __version__
-from cmm_uq.app.desk import export_pages, job_pages as jobs
-from cmm_uq.app.desk.export_pages import ARTEFACT, FIELDS, READ
-from cmm_uq.app.desk.folder import DeskFolder, to, verify_page
-from cmm_uq.app.desk.job_pages import JobState, state_of
+from cmm_uq.app.desk import job_pages as jobs
+from cmm_uq.app.desk.folder import DeskFolder
+from cmm_uq.app.desk.job_pages import ARTEFACT, FIELDS, READ, JobState, state_of
 from cmm_uq.app.desk.place import ChangedError, Draft, below, jobs_in, plans_in, sha256, write_over
-from cmm_uq.app.desk.workers import OWN_FILES, ReportRun, own_file, records_page, shown_file
-from cmm_uq.app.serve.accounts import POLICY, Accounts, Guard
-from cmm_uq.app.serve.exchange import (
-    DESK,
-    RefusedRequest,
-    WebRequest,
-    WebResponse,
-    fault,
-    read_form,
-    refusal,
-    render_page,
-)
-from cmm_uq.app.serve.page import WebPage
+from cmm_uq.app.desk.workers import ReportRun, shown_file
+from cmm_uq.app.serve.accounts import Accounts, Guard
+from cmm_uq.app.serve.application import POLICY, Answer, routed
+from cmm_uq.app.serve.exchange import DESK, RefusedRequest, WebRequest, WebResponse, read_form, to
+from cmm_uq.app.serve.page import WebPage, page
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.laboratory.records.place import is_url, place_of
+
+if TYPE_CHECKING:
+    from cmm_uq.app.serve.site import Site
 
 AT_ONCE = 2  # reports under way
 
 
+def records_pages() -> tuple[Any, Any]:
+    """The modules of the records' pages and of a certificate's, which load what computes."""
+    from cmm_uq.app.serve import certificate_page, site
+
+    return site, certificate_page
+
+
+def typed(form: Mapping[str, str], *but: str) -> dict[str, str]:
+    """What somebody filled in, without what goes with the form."""
+    return {name: value for name, value in form.items() if name not in ("draft", "kind", "seen", "then", *but)}
+
+
 class Desk(DeskFolder):
     """Answers the requests of one start; ``root``: the folder that it works in."""
+
+    desk = True
 
     def __init__(self, root: Path, tell: Callable[[str], None] = lambda line: None) -> None:
         super().__init__(root)
         self.tell = tell
         self.runs: dict[str, ReportRun] = {}
         self.checked: dict[str, tuple[str, Text]] = {}
-        self._lock = threading.Lock()
-        self.guard: Guard | Accounts | None = None
-        self.url = ""
+        self._lock, self._opening = threading.Lock(), threading.Lock()
+        self._site: Site | None = None
 
     def open_at(self, url: str, port: int, accounts: Path | None = None) -> str:
         """Begin with a link that is opened once, or with ``accounts`` of those who may sign in."""
@@ -62,48 +69,42 @@ class Desk(DeskFolder):
         return self.guard.link(url)
 
     def begin(self) -> None:
-        """Load in the worker what is slow to load, so that no page waits for it."""
+        """Load what is slow to load, in the worker first, so that no page waits for it."""
         self.reader.ask("ready")
+        records_pages()
 
     def close(self) -> None:
         for run in self.runs.values():
             run.cancel()
         self.reader.end()
 
-    def answer(self, request: WebRequest | RefusedRequest) -> WebResponse:
-        try:
-            if isinstance(request, RefusedRequest):
-                raise request
-            if self.guard is None:
-                raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the desk is not open yet"))
-            return self.guard.admit(request, self.url) or self._answer(request)
-        except RefusedRequest as error:
-            refused = error
-        except CmmUqError as error:
-            told: Text = Verbatim(error.problem)
-            if error.where:
-                told = say("{problem} ({where})", problem=told, where=Verbatim(error.where))
-            refused = RefusedRequest(HTTPStatus.CONFLICT, told, Verbatim(error.fix or ""))
-        except TimeoutError:
-            refused = RefusedRequest(HTTPStatus.REQUEST_TIMEOUT, say("the request took too long to come"))
-        except Exception as error:  # a fault is told on its page; the others go on
-            refused = fault(error)
-        return self._rendered(refusal(refused))
-
-    def _answer(self, request: WebRequest) -> WebResponse:
-        if request.path in OWN_FILES and request.method != "POST":
-            return own_file(request.path)
+    def respond(self, request: WebRequest) -> Answer:
+        if self.guard is None:
+            raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the desk is not open yet"))
         if not (request.path + "/").startswith(DESK + "/"):
-            return records_page(self.reader, request, account=isinstance(self.guard, Accounts))
-        pages = self._forms() if request.method == "POST" else self._pages()
-        if request.path not in pages:
-            if request.path in self._pages():
-                raise RefusedRequest(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
-            raise RefusedRequest(HTTPStatus.NOT_FOUND, say("there is no page of that address"))
-        found = pages[request.path](request)
-        return found if isinstance(found, WebResponse) else self._rendered(found)
+            return self.records.respond(request)
+        found: Answer = routed(request, self._pages(), self._forms())(request)
+        return found
 
-    def _pages(self) -> Mapping[str, Callable[[WebRequest], WebPage | WebResponse]]:
+    def foot(self, page: WebPage) -> Text:
+        return say("Folder: {root}", root=Verbatim(str(self.root))) if page.place == DESK else self.records.foot(page)
+
+    @property
+    def records(self) -> Site:
+        """The pages of the records that reports of this folder are kept in; loaded when they are first looked at."""
+        with self._opening:
+            if self._site is None:
+                where = place_of(None)
+                if where is None:
+                    fix = "Start the desk without CMM_UQ_RECORDS=none to keep them"
+                    raise CmmUqError("no records are kept here", fix=fix)
+                place = where if is_url(where) else self.root / where
+                if isinstance(place, Path) and not place.exists():
+                    raise CmmUqError("no certificate is recorded here yet", fix="Make the first one on the desk")
+                self._site = records_pages()[0].Site(place)
+            return self._site
+
+    def _pages(self) -> Mapping[str, Callable[[WebRequest], Answer]]:
         return {
             DESK: self.home,
             READ: self.reading,
@@ -115,12 +116,12 @@ class Desk(DeskFolder):
             jobs.FILE: partial(shown_file, self.root),
             jobs.PART: self.part,
             jobs.FACTS: self.facts,
-            jobs.VERIFY: lambda request: verify_page(),
+            jobs.VERIFY: lambda request: page("desk/verify.html", DESK, name="", found=None),
             jobs.EVENTS: self.events,
             jobs.FIELD: self.field,
         }
 
-    def _forms(self) -> Mapping[str, Callable[[WebRequest], WebPage | WebResponse]]:
+    def _forms(self) -> Mapping[str, Callable[[WebRequest], Answer]]:
         return {
             f"{DESK}/drop": self.drop,
             READ: self.correct,
@@ -167,13 +168,13 @@ class Desk(DeskFolder):
         request.only(("draft",))
         one = self.drafts.read(request.text("draft"))
         found = self.reader.ask("read", path=one.export, keys=one.keys)
-        return export_pages.read_page(one, found, plans_in(self.root) if found["lines"] else ())
+        return jobs.read_page(one, found, plans_in(self.root) if found["lines"] else ())
 
-    def correct(self, request: WebRequest) -> WebPage | WebResponse:
+    def correct(self, request: WebRequest) -> Answer:
         form = read_form(request)
         one = self.drafts.read(form.get("draft", ""))
         one.seen = form.get("seen", "")
-        chosen, said = export_pages.said_in(form)
+        chosen, said = jobs.said_in(form)
         if said.get("plan"):
             said["plan"] = below(self.root, said["plan"]).relative_to(self.root).as_posix()
         one.keys = self.reader.ask("corrected", path=one.export, keys=one.keys, chosen=chosen, said=said)
@@ -184,7 +185,8 @@ class Desk(DeskFolder):
 
     def artefact(self, request: WebRequest) -> WebPage:
         request.only(("draft",))
-        return export_pages.artefact_page(self.drafts.read(request.text("draft")), self.reader.ask("kinds"))
+        draft = self.drafts.read(request.text("draft"))
+        return page("desk/artefact.html", DESK, draft=draft, kinds=self.reader.ask("kinds"))
 
     def fields(self, request: WebRequest) -> WebPage:
         request.only(("draft", "kind"))
@@ -199,19 +201,19 @@ class Desk(DeskFolder):
             found = {"problems": [str(refused)], "warnings": []}
         elif one.values:
             found = self.reader.ask("check_answers", kind=kind, export=one.export, keys=one.keys, values=values)
-        page = export_pages.fields_page(one, kind, fields, self.drafts.last(), found)
-        return page if refused is None else page._replace(status=HTTPStatus.CONFLICT)
+        shown = jobs.fields_page(one, kind, fields, self.drafts.last(), found)
+        return shown if refused is None else shown._replace(status=HTTPStatus.CONFLICT)
 
-    def fill_in(self, request: WebRequest) -> WebPage | WebResponse:
+    def fill_in(self, request: WebRequest) -> Answer:
         form = read_form(request)
         one, kind = self.drafts.read(form.get("draft", "")), form.get("kind", "")
         one.seen = form.get("seen", "")
-        one.values = {name: value for name, value in form.items() if name not in ("draft", "kind", "seen", "then")}
+        one.values = typed(form)
         self.drafts.write(one)
         if form.get("then") != "create":
             return to(FIELDS, draft=one.id, kind=kind)
         folder = one.values.get("folder", "").strip()
-        values = {name: value for name, value in one.values.items() if name != "folder"}
+        values = typed(one.values, "folder")
         try:
             self.check_new(folder)
             self.reader.ask("create", kind=kind, export=one.export, keys=one.keys, values=values, folder=folder)
@@ -230,12 +232,8 @@ class Desk(DeskFolder):
             found = self.reader.ask("check", job=name, text=text)
         else:
             one = self.drafts.read(form.get("draft", ""))
-            values = {
-                name: value for name, value in form.items() if name not in ("draft", "kind", "seen", "then", "folder")
-            }
-            found = self.reader.ask(
-                "check_answers", kind=form.get("kind", ""), export=one.export, keys=one.keys, values=values
-            )
+            asked: dict[str, Any] = {"kind": form.get("kind", ""), "export": one.export, "keys": one.keys}
+            found = self.reader.ask("check_answers", **asked, values=typed(form, "folder"))
         return WebResponse(json.dumps(found).encode(), "application/json", policy=POLICY)
 
     def job(self, request: WebRequest) -> WebPage:
@@ -244,15 +242,15 @@ class Desk(DeskFolder):
         content = content_of(self.root / name / "job.toml", JOB_BYTES, "")
         return self._job(name, content.decode("utf-8", "replace"), sha256(content))
 
-    def _job(self, name: str, text: str, seen: str, above: tuple[Any, ...] = (), draft: str | None = None) -> WebPage:
+    def _job(self, name: str, text: str, seen: str, difference: str | None = None, draft: str | None = None) -> WebPage:
         check = self.reader.ask("check", job=name, text=draft)
         if draft is None:
             count = len(check["problems"])
             told = say("checked: {count} problems", count=count) if count else say("checked: nothing would stop it")
             self.checked[name] = seen, told
-        return jobs.job_page(self.root, state_of(self.root, self.root / name), check, text, seen, above)
+        return jobs.job_page(self.root, state_of(self.root, self.root / name), check, text, seen, difference)
 
-    def save(self, request: WebRequest) -> WebPage | WebResponse:
+    def save(self, request: WebRequest) -> Answer:
         form = read_form(request)
         name, text = self.job_of(form.get("name", "")), form.get("text", "")
         if form.get("then") != "save":
@@ -260,10 +258,9 @@ class Desk(DeskFolder):
         try:
             write_over(self.root / name / "job.toml", text.encode(), form.get("seen", ""))
         except ChangedError as changed:
-            page = self._job(
-                name, text, sha256(changed.now), export_pages.difference(changed.now, text.encode()), draft=text
-            )
-            return page._replace(status=HTTPStatus.CONFLICT)
+            difference = jobs.difference(changed.now, text.encode())
+            shown = self._job(name, text, sha256(changed.now), difference, text)
+            return shown._replace(status=HTTPStatus.CONFLICT)
         return to(jobs.JOB, name=name)
 
     def run(self, request: WebRequest) -> WebResponse:
@@ -284,13 +281,13 @@ class Desk(DeskFolder):
         request.only(("name",))
         return self.runs.get(request.text("name"))
 
-    def running(self, request: WebRequest) -> WebPage | WebResponse:
+    def running(self, request: WebRequest) -> Answer:
         run = self._run_of(request)
         if run is None:  # of an earlier start
             return to(jobs.JOB, name=self.job_of(request.text("name")))
         if run.found is not None:
             return to(jobs.CERTIFICATE, name=run.job)
-        return jobs.run_page(run)
+        return page("desk/run.html", DESK, run=run)
 
     def cancel(self, request: WebRequest) -> WebResponse:
         name = read_form(request).get("name", "")
@@ -307,9 +304,9 @@ class Desk(DeskFolder):
     def certificate(self, request: WebRequest) -> WebPage:
         request.only(("name",))
         one = self._state(request.text("name"))
-        said = self.reader.ask("results", path=one.file("results.json"))
         warnings = self.reader.ask("check", job=one.name, text=None)["warnings"]
-        return jobs.certificate_page(one, said, self._field_of(one).is_file(), warnings)
+        diagnosed = records_pages()[1].diagnosed(one.results.get("diagnosis"))
+        return jobs.certificate_page(one, diagnosed, self._field_of(one).is_file(), warnings)
 
     def _state(self, name: str) -> JobState:
         one = state_of(self.root, self.root / self.job_of(name))
@@ -340,13 +337,3 @@ class Desk(DeskFolder):
         return WebResponse(
             content_of(path, TABLE_BYTES, "Make the certificate again"), "application/json", policy=POLICY
         )
-
-    def _rendered(self, page: WebPage) -> WebResponse:
-        foot = (
-            say("Folder: {root}", root=Verbatim(str(self.root))),
-            say("cmm-uq {version}", version=Verbatim(__version__)),
-        )
-        body = render_page(
-            page._replace(place=page.place or DESK), foot, desk=True, account=isinstance(self.guard, Accounts)
-        )
-        return WebResponse(body, status=page.status, policy=POLICY, referrer="same-origin")

@@ -1,4 +1,4 @@
-"""Jobs of the root folder: the list, one job with its files, a report under way, and its certificate with what to do next."""
+"""The desk's pages: an export and what is asked of it, jobs of the root folder with their files, and certificates."""
 
 from __future__ import annotations
 
@@ -6,20 +6,125 @@ import datetime as dt
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import unified_diff
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.app.desk.export_pages import DESK_CELL, READ, check_blocks, facts_form, steps
 from cmm_uq.app.desk.place import Draft, sha256
-from cmm_uq.app.desk.workers import ReportRun
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.exchange import DESK
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.output.manifest import plain_name
+from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdict, Verdicts
+
+READ, ARTEFACT, FIELDS = f"{DESK}/read", f"{DESK}/artefact", f"{DESK}/fields"
+MEANINGS: Mapping[str, Text] = {
+    "": say("not used"),
+    "x_mm": say("x"),
+    "y_mm": say("y"),
+    "z_mm": say("z"),
+    "length_mm": say("measured length"),
+    "nominal_mm": say("nominal length"),
+    "reference_mm": say("calibrated length"),
+    "deviation_um": say("deviation, µm"),
+    "deviation_mm": say("deviation, mm"),
+    "line": say("line"),
+    "repeat": say("repeat (run)"),
+    "measurement": say("set-up"),
+    "point": say("point"),
+    "name": say("name"),
+    "temp_artefact_c": say("temperature of the artefact"),
+    "temp_air_c": say("temperature of the air"),
+    "time_s": say("time"),
+}
+_CLASSES = {
+    "x": "x_mm",
+    "y": "y_mm",
+    "z": "z_mm",
+    "length": "length_mm deviation_um deviation_mm",
+    "nominal": "nominal_mm reference_mm",
+    "repeat": "repeat line measurement point name",
+    "ignored": "ignored",
+    "unknown": "unknown",
+}
+COLOURED = {meaning: name for name, meanings in _CLASSES.items() for meaning in meanings.split()}
+"""Classes of the style sheet."""
+_UNITS = ("mm", "um", "inch", "m", "cm", "mil")
+_HERE = {
+    r"^Say (which|by which column|it is|which column).*columns": say("Choose what it is in the table below"),
+    r"^Say which column is which": say("Choose x, y and z, or the lengths, in the table below"),
+    r"lines = ": say("Fill in below where the lines lie"),
+    r"^Say (which: )?sheet": say("Choose the sheet below"),
+    r"\bunit = ": say("Choose the unit below"),
+    r"\bdecimal = ": say("Choose the decimal sign below"),
+    r"points_per_measurement = ": say("Choose the column of the set-up, or say below how many rows in turn are one"),
+}
+"""What a remedy in words of job.toml is on this page."""
+_OF_ITEM = (
+    *("machine.", "artefact.", "job.customer", "job.address", "conformity.limit_um"),
+    *("rated_conditions.", "test_uncertainty."),
+)  # facts of one thing, or one customer, which another must not get unseen
+
+
+def here(fix: str) -> Text:
+    """A remedy, in terms of the page where that can be said."""
+    return next((text for pattern, text in _HERE.items() if re.search(pattern, fix)), Verbatim(fix))
+
+
+def read_page(draft: Draft, found: Mapping[str, Any], plans: Sequence[str] = ()) -> p.WebPage:
+    """The reading of an export, whole, and the form that corrects it; ``plans``: files that may say where lines lie."""
+    problem, said = found["problem"], draft.keys
+    where, _, fix = problem or ("", "", "")
+    sheets = [(one, one) for one in found["sheets"]] if len(found["sheets"]) > 1 or said.get("sheet") else []
+    return p.page(
+        "desk/read.html", DESK, draft=draft, found=found, columns=list(map(_column, found["columns"])), sheets=sheets,
+        told=[one for one in (where if where != draft.name else "", here(fix) if fix else "") if one],
+        said=lambda name, none="": said.get(name, none), corrected={*said} - {"lines"}, units=[(one, one) for one in _UNITS],
+        plans=[(one, one) for one in plans] if found["lines"] and problem else [],
+        rows_asked=said.get("points_per_measurement") or "points_per_measurement" in fix,
+    )  # fmt: skip
+
+
+def _column(column: tuple[str, str]) -> tuple[str, str, str, list[tuple[str, Text]]]:
+    """Heading, class of the style sheet, what a column is taken for, and what it may be."""
+    heading, meaning = column
+    value = "" if meaning in ("ignored", "unknown") else meaning
+    options = dict(MEANINGS) if value in MEANINGS else {**MEANINGS, value: Verbatim(value)}
+    if value != "name":
+        options.pop("name")
+    if meaning == "unknown":
+        options[""] = say("not understood")
+    return heading, COLOURED.get(meaning, "other"), value, list(options.items())
+
+
+def said_in(form: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
+    """Meanings of columns by index, and the other keys of an import, as a form has them."""
+    chosen = {name[1:]: value for name, value in form.items() if re.fullmatch(r"c\d+", name)}
+    names = ("unit", "decimal", "sheet", "points_per_measurement", "plan")
+    others: dict[str, Any] = {name: form[name].strip() for name in names if form.get(name, "").strip()}
+    lines = {name[5:]: value.strip() for name, value in form.items() if name.startswith("line:") and value.strip()}
+    return chosen, others | {"lines": lines}
+
+
+def fields_page(
+    draft: Draft, kind: str, fields: list[dict[str, str]], last: Mapping[str, str], found: Mapping[str, Any] | None
+) -> p.WebPage:
+    """The dozen things that a job states, with what was filled in last; ``found``: what a check of them says."""
+    again = {key: value for key, value in last.items() if key.startswith(_OF_ITEM)}
+    filled = draft.values if draft.values else {key: value for key, value in last.items() if key not in again}
+    return p.page("desk/fields.html", DESK, draft=draft, kind=kind, fields=fields, filled=filled, again=again, last=last,
+                  found=found)  # fmt: skip
+
+
+def difference(theirs: bytes, mine: bytes) -> str:
+    """What another tab, editor or command changed, against what was to be written."""
+    before, after = (content.decode("utf-8", "replace").splitlines() for content in (theirs, mine))
+    return "\n".join(list(unified_diff(before, after, "as it is now", "as it was to be", lineterm=""))[:400])
+
 
 JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run", "cancel", "certificate", "file"))
 PART, POINTS, DELETE, EVENTS = (f"{DESK}/{name}" for name in ("part", "points", "delete", "events"))
@@ -32,13 +137,14 @@ _ID = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 
 @dataclass(frozen=True)
 class JobState:
-    """A job's folder as it is; ``decision`` and ``made`` of its certificate, ``current``: whether its inputs are the same."""
+    """A job's folder as it is; ``results``, ``verdicts``, ``made`` of its certificate, ``current``: whether its inputs are."""
 
     name: str  # path below the root
     id: str
     machine: str = ""
     part: bool = False
-    decision: str | None = None
+    results: Mapping[str, Any] = field(default_factory=dict)
+    verdicts: Verdicts = NO_VERDICTS
     made: dt.datetime | None = None
     current: bool = False
     checked: Text = NOTHING  # what check said of it as it is
@@ -51,8 +157,7 @@ class JobState:
         when = say("of {day}", day=Verbatim(self.made.strftime("%Y-%m-%d %H:%M")))
         if not self.current:
             return p.Cell(say("Certificate, and changed since"), standing="open", note=when)
-        word, standing = p.DECISIONS.get(self.decision or "none", (Verbatim(self.decision or ""), "open"))
-        return p.Cell(word, standing=standing, note=when)
+        return p.cell_of(p.DECISIONS, self.verdicts.overall)._replace(note=when)
 
     def file(self, ending: str) -> str:
         """The certificate's file of an ending; empty where there is none."""
@@ -81,51 +186,34 @@ def state_of(root: Path, folder: Path) -> JobState:
         results = json.loads(content_of(report / RESULTS, TABLE_BYTES, ""))
         inputs = {name: one for name, one in results["job"]["inputs_sha256"].items() if plain_name(name)}
         current = all(sha256(content_of(folder / one, TABLE_BYTES, "")) == same for one, same in inputs.items())
-        decision = str((results.get("verdicts") or {}).get("overall", "none"))
+        verdicts = Verdicts.of_results(results)
     except (CmmUqError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        current, decision = False, "none"
+        results, verdicts, current = {}, NO_VERDICTS, False
     made = dt.datetime.fromtimestamp((report / RESULTS).stat().st_mtime)
     files = tuple(
         f"{REPORTS}/{own}/{path.name}" for path in sorted(report.iterdir()) if path.is_file() and path.name[0] != "."
     )
-    return JobState(name, own, of, part, decision, made, current, NOTHING, files)
+    return JobState(name, own, of, part, results, verdicts, made, current, NOTHING, files)
 
 
 def home_page(root: Path, jobs: Iterable[JobState], drafts: Iterable[Draft], count: int) -> p.WebPage:
-    rows = []
-    for one in jobs:
-        result = p.Cell(say("Certificate"), p.address(CERTIFICATE, name=one.name)) if one.made else p.Cell(NOTHING)
-        rows.append(
-            (
-                p.Cell(Verbatim(one.name), p.address(JOB, name=one.name)),
-                p.Cell(p.shown(one.machine)),
-                one.standing,
-                result,
-            )
-        )
+    rows = tuple(
+        (p.Cell(Verbatim(one.name), p.address(JOB, name=one.name)), p.Cell(p.shown(one.machine)), one.standing,
+         p.Cell(say("Certificate"), p.address(CERTIFICATE, name=one.name)) if one.made else p.Cell(NOTHING))
+        for one in jobs
+    )  # fmt: skip
     headings = p.columns(say("Job"), say("Machine"), say("State"), say("Result"))
     more = (say("The newest {shown} of {count}.", shown=LISTED, count=count),) if count > LISTED else ()
     none = say("No job lies here yet: drop an export.")
-    table = p.PageTable(say("Jobs"), headings, tuple(rows), none, more, heard=True)
-    begun = tuple(p.Cell(Verbatim(one.name), p.address(PART if one.part else READ, draft=one.id)) for one in drafts)
-    formats = say("CSV, text, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++: as the measuring program wrote it")
-    hint = say("{formats}; at most {most} MB.", formats=formats, most=number(TABLE_BYTES.most // 2**20))
-    drop = p.Drop(f"{DESK}/drop", say("Drop an export here, or choose one"), hint, say("Read it"))
-    notices = (p.PageNotice(say("Begun, and no job yet"), "open", begun),) if begun else ()
-    part = p.Cell(say("Its plan, the certificate of the machine, and its points"), PART)
-    received = p.Cell(say("Verify it: who says what, what it rests on, and whether it holds"), VERIFY)
-    sections = (
-        *p.section(say("Jobs in this folder"), table),
-        *p.section(say("A part"), p.Links((part,))),
-        *p.section(say("A certificate that you received"), p.Links((received,))),
-    )
-    return p.WebPage(say("Desk"), DESK, Verbatim(str(root)), (drop, *notices), sections)
+    begun = [p.Cell(Verbatim(one.name), p.address(PART if one.part else READ, draft=one.id)) for one in drafts]
+    table = p.PageTable(say("Jobs"), headings, rows, none, more, heard=True)
+    return p.page("desk/home.html", DESK, root=root, jobs=table, begun=begun, most=number(TABLE_BYTES.most // 2**20))
 
 
 def job_page(
-    root: Path, one: JobState, check: Mapping[str, Any], text: str, seen: str, above: tuple[p.Block, ...] = ()
+    root: Path, one: JobState, check: Mapping[str, Any], text: str, seen: str, difference: str | None
 ) -> p.WebPage:
-    """One job: what check says, its job.toml to be changed, its files."""
+    """One job: what check says, its job.toml to be changed, its files; ``difference``: to what another wrote meanwhile."""
     rows: list[tuple[p.Cell, ...]] = []
     for path in sorted((root / one.name).rglob("*")):
         name = path.relative_to(root).as_posix()
@@ -133,149 +221,55 @@ def job_page(
             size = say("{bytes} bytes", bytes=number(path.stat().st_size, ",d"))
             rows.append((p.Cell(Verbatim(name), p.address(FILE, at=name)), p.Cell(size)))
     files = p.PageTable(say("Files of the job"), p.columns(say("File"), say("Size")), tuple(rows), heard=True)
-    name_field = (("name", one.name),)
-    blocks = [*above]
-    if one.made:
-        look = p.Cell(say("Look at it"), p.address(CERTIFICATE, name=one.name))
-        blocks.append(
-            p.PageNotice(say("There is a certificate"), "good" if one.current else "open", (one.standing, look))
-        )
-    blocks += check_blocks(check)
-    if check.get("sound"):
-        blocks.append(p.PageForm(RUN, (), (("run", say("Make the certificate")),), name_field))
-    if one.part:
-        hint = say("CSV with feature, point, x_mm, y_mm, z_mm, in the frame of the part; job.toml then names it.")
-        blocks.append(
-            p.Drop(p.address(POINTS, name=one.name), say("Drop the measured points here"), hint, say("Take them"))
-        )
-    buttons = (("save", say("Save")), ("check", say("Check")))
-    entry = p.FormEntry("text", say("job.toml"), text, "area")
-    edit = p.PageForm(JOB, (entry,), buttons, (*name_field, ("seen", seen)), check=f"{DESK}/check")
-    commands = f"cmm-uq check {one.name}\ncmm-uq {'part' if one.part else 'report'} {one.name}"
-    change = () if one.part else (p.Links((p.Cell(say("Change it by fields"), p.address(FACTS, name=one.name)),)),)
-    sections = (
-        *p.section(say("What it states"), *change, edit),
-        *p.section(say("Its files"), files),
-        *p.section(say("The same by commands"), p.SourceText(say("Commands"), commands)),
-    )
-    title, lead = Verbatim(one.id or one.name), p.shown(one.machine)
-    return p.WebPage(title, DESK, lead, tuple(blocks), sections, (DESK_CELL,))
+    return p.page("desk/job.html", DESK, one=one, check=check, text=text, seen=seen, difference=difference, files=files)
 
 
-def facts_page(
-    name: str, found: Mapping[str, Any], values: Mapping[str, str], seen: str, above: tuple[p.Block, ...]
-) -> p.WebPage:
-    """What a job states, by fields; what else stands in its job.toml stays as it is."""
-    buttons = (("save", say("Save")), ("check", say("Check")))
-    form = facts_form(FACTS, found["fields"], values, buttons, (("name", name), ("seen", seen)))
-    lead = say("What is left empty is not stated. All else in job.toml stays as it is.")
-    places = (DESK_CELL, p.Cell(Verbatim(name), p.address(JOB, name=name)))
-    return p.WebPage(say("What the job states"), DESK, lead, (*above, form), above=places)
-
-
-def differing(found: Mapping[str, Any], values: Mapping[str, str]) -> p.PageNotice:
+def differing(found: Mapping[str, Any], values: Mapping[str, str]) -> list[str]:
     """Fields that are another in the file by now than they were typed."""
     labels = {one["key"]: one["label"] for one in found["fields"]}
-    lines = [
+    return [
         f"{labels[key]}: {now or '(empty)'} in the file, {values.get(key, '') or '(empty)'} here"
         for key, now in found["values"].items()
         if now != values.get(key, "").strip()
     ]
-    head = say("Not written: it was changed meanwhile, by another tab, an editor or a command")
-    return p.PageNotice(head, "bad", p.lines_of(lines))
 
 
-def run_page(run: ReportRun) -> p.WebPage:
-    name = (("name", run.job),)
-    again = p.PageForm(RUN, (), (("run", say("Begin again")),), name)
-    blocks: tuple[p.Block, ...]
-    if run.cancelled:
-        blocks = (p.PageNotice(say("Cancelled: nothing was written"), "open"), again)
-    elif run.problem is not None:
-        where, problem, fix = run.problem
-        blocks = (p.PageNotice(Verbatim(problem), "bad", p.lines_of(filter(None, (where, fix)))), again)
-    else:
-        under_way = p.Running(p.address(EVENTS, name=run.job), Verbatim(run.what), round(100 * run.part))
-        blocks = (steps(4), under_way, p.PageForm(CANCEL, (), (("cancel", say("Cancel")),), name))
-    above = (DESK_CELL, p.Cell(Verbatim(run.job), p.address(JOB, name=run.job)))
-    return p.WebPage(say("Certificate under way"), DESK, Verbatim(run.job), blocks, above=above)
-
-
-def certificate_page(one: JobState, said: Mapping[str, Any], field: bool, warnings: Iterable[str]) -> p.WebPage:
+def certificate_page(one: JobState, diagnosis: Any, field: bool, warnings: Iterable[str]) -> p.WebPage:
     """The certificate, its diagnosis, the residual field, and what to do next."""
-    word, standing = p.DECISIONS.get(said["overall"], (Verbatim(said["overall"]), "open"))
-    lines = tuple(p.Cell(_decided(*each[:-1])) for each in said["decided"])
-    lacking = [p.PageNotice(Verbatim(each[0]), "open", p.lines_of(each[-1])) for each in said["decided"] if each[-1]]
-    blocks = [p.PageNotice(word if lines else say("It states no conformity"), standing or "good", lines)]
-    if not one.current:
-        blocks.insert(0, p.PageNotice(say("The job was changed since: make the certificate again"), "open"))
-    pdf, page = one.file(".pdf"), one.file(".html")
-    links = [p.Cell(say("Open the PDF"), p.address(FILE, at=pdf))] if pdf else []
-    for label, path in (("PDF", pdf), ("HTML", page), (RESULTS, one.file(RESULTS)), ("DCC", one.file(".xml"))):
-        if path:
-            keep = say("{name} to keep", name=Verbatim(label))
-            links.append(p.Cell(keep, p.address(FILE, at=path, keep="yes"), download=True))
-    diagnosis = [_said(each) for each in said["diagnosis"]]
-    if field:
-        told = say("Residuals as vectors in the volume; the certificate has them as pictures.")
-        diagnosis.append(p.Turnable(p.address(FIELD, name=one.name), told))
-    frame = (p.SandboxFrame(say("Certificate"), p.address(FILE, at=page)),) if page else ()
-    sections = (
-        *p.section(say("What to do next"), *next_steps(one, said, warnings)),
-        *p.section(say("What a complete test lacks"), *lacking),
-        *p.section(say("Diagnosis"), *diagnosis),
-        *p.section(say("The certificate"), *frame),
-    )
-    title, above = (
-        say("Certificate {number}", number=Verbatim(one.id)),
-        p.Cell(Verbatim(one.name), p.address(JOB, name=one.name)),
-    )
-    return p.WebPage(title, DESK, p.shown(one.machine), (*blocks, p.Links(tuple(links))), sections, (DESK_CELL, above))
+    return p.page(
+        "desk/certificate.html", DESK, one=one, outcome=p.cell_of(p.DECISIONS, one.verdicts.overall),
+        decided=list(map(_decided, one.verdicts)), diagnosis=diagnosis, field=field, next_steps=next_steps(one, warnings),
+        lacking=[(_by(each), each.missing) for each in one.verdicts if each.missing],
+    )  # fmt: skip
 
 
-def _decided(by: str, outcome: str, value: Any, expanded: Any, limit: Any, unit: str) -> Text:
-    told = say("{by}: {word:small}", by=Verbatim(by), word=p.DECISIONS.get(outcome, (Verbatim(outcome), None))[0])
-    for text, figure, digits in (("", value, ".3g"), (" against", limit, ".3g"), (", U =", expanded, ".2g")):
+def _by(one: Verdict) -> str:
+    return f"{one.by} {one.name or one.title}".strip()
+
+
+def _decided(one: Verdict) -> Text:
+    word = p.DECISIONS.get(one.outcome, (Verbatim(one.outcome), None))[0]
+    told = say("{by}: {word:small}", by=Verbatim(_by(one)), word=word)
+    for lead, figure, digits in ((";", one.value, ".3g"), (" against", one.limit, ".3g"), (", U =", one.U, ".2g")):
         if not isinstance(figure, int | float):
             return told
-        lead = Verbatim(text or ";")
-        told = say(
-            "{told}{lead} {figure} {unit}", told=told, lead=lead, figure=number(figure, digits), unit=Verbatim(unit)
-        )
+        size = say("{figure} {unit}", figure=number(figure, digits), unit=one.unit)
+        told = say("{told}{lead} {size}", told=told, lead=Verbatim(lead), size=size)
     return told
 
 
-def _said(block: list[Any]) -> p.Block:
-    """A block of a diagnosis as the worker gives it."""
-    if block[0] == "fact":
-        return p.PageFacts(((Verbatim(block[1]), p.Cell(Verbatim(block[2]), standing=block[3])),))
-    if block[0] == "table":
-        rows = tuple(tuple(p.Cell(Verbatim(text)) for text in row) for row in block[3])
-        return p.PageTable(Verbatim(block[1]), p.columns(*map(Verbatim, block[2])), rows)
-    return p.PageParagraph(Verbatim(block[1]))
-
-
-def next_steps(one: JobState, said: Mapping[str, Any], warnings: Iterable[str]) -> tuple[p.Block, ...]:
+def next_steps(one: JobState, warnings: Iterable[str]) -> list[Text]:
     steps: list[Text] = []
-    lacking = [text for text in warnings if "not stated" in text]
     if "simulated" in Path(one.file(".html")).name:
         steps.append(say("The readings are simulated: put in your own recording before anybody relies on it."))
-    if said["overall"] in ("fail", "conditional fail"):
+    if one.verdicts.overall in ("fail", "conditional fail"):
         steps.append(
             say("The machine does not conform: what the diagnosis names is to be looked at first, then measured again.")
         )
-    if said["overall"] in ("incomplete", "undecided"):
+    if one.verdicts.overall in ("incomplete", "undecided"):
         steps.append(say("The test is not complete or not decided: what is missing stands below."))
-    steps += [Verbatim(text) for text in lacking]
-    steps.append(
-        say(
-            "Release it, after somebody else has looked at it, with the command below; then the customer gets PDF and DCC."
-        )
+    steps += [Verbatim(text) for text in warnings if "not stated" in text]
+    released = say(
+        "Release it, after somebody else has looked at it, with the command below; then the customer gets PDF and DCC."
     )
-    shown: list[p.Block] = [p.PageParagraph(text) for text in steps]
-    release = f"cmm-uq release {one.id} --by 'NAME' --reason 'checked against the recording'"
-    shown.append(p.SourceText(say("Command"), release))
-    shown.append(
-        p.Links((p.Cell(say("This machine and its history"), "/"), p.Cell(say("All certificates"), "/certificates")))
-    )
-    return tuple(shown)
+    return [*steps, released]

@@ -8,15 +8,12 @@ The job of a part, as the worker writes it from a plan and the certificate of th
 
 from __future__ import annotations
 
-import base64
 import contextlib
-import io
 import json
 import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping
-from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, TextIO
@@ -32,9 +29,6 @@ from cmm_uq.app.commands.parts.part import PartOptions, write_part
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.app.desk import exports, questions
 from cmm_uq.app.serve import page as p
-from cmm_uq.app.serve.certificate_page import diagnosis_section
-from cmm_uq.app.serve.exchange import WebRequest
-from cmm_uq.app.serve.site import Site
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of, value_of
 from cmm_uq.base.output import Owner
@@ -44,7 +38,6 @@ from cmm_uq.certificate.verify.given import CHECKS
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import is_part
 from cmm_uq.jobs.tables.identification import MEASURED
-from cmm_uq.laboratory.records.place import is_url, of_folder, place_of
 
 
 def create_part(plan: str, certificate: str, folder: str, date: str, not_measured: bool) -> dict[str, Any]:
@@ -101,38 +94,6 @@ def vectors(written: Written[Outcome]) -> dict[str, Any] | None:
     }
 
 
-def results(path: str) -> dict[str, Any]:
-    """Decisions and diagnosis of a results.json, in words."""
-    data = json.loads(Path(path).read_bytes())
-    verdicts = data.get("verdicts") or {}
-    decided = [
-        [
-            f"{one.get('by') or ''} {one.get('name') or one.get('title') or ''}".strip(),
-            one.get("outcome", ""),
-            one.get("value"),
-            one.get("U"),
-            one.get("limit"),
-            one.get("unit", ""),
-            one.get("missing") or [],
-        ]
-        for one in verdicts.get("statements", [])
-    ]
-    sections = diagnosis_section(data.get("diagnosis") or {})
-    said: list[list[Any]] = []
-    for _, blocks in sections:
-        for block in blocks:
-            if isinstance(block, p.PageFacts):
-                said += [["fact", str.__str__(label), str.__str__(one.text), one.standing] for label, one in block.rows]
-            elif isinstance(block, p.PageTable):
-                rows = [[str.__str__(one.text) for one in row] for row in block.rows]
-                said.append(
-                    ["table", str.__str__(block.caption), [str.__str__(one.heading) for one in block.columns], rows]
-                )
-            elif isinstance(block, p.PageParagraph):
-                said.append(["text", str.__str__(block.text)])
-    return {"overall": verdicts.get("overall", "none"), "decided": decided, "diagnosis": said}
-
-
 def verification(path: str) -> dict[str, Any]:
     """What a certificate says, on what it rests, and whether it holds, as ``cmm-uq verify --no-rerun`` finds it."""
     found = verify((Path(path),), rerun=False)
@@ -172,34 +133,6 @@ def _said(subject: str, job: Job | None, decided: str) -> str:
     return f"{who} says of {machine}, measured on {facts.job.date}: {str(decision).lower()}. It rests on {rests}."
 
 
-@cache
-def _site(account: bool) -> Site:
-    where = place_of(None, of_folder(None))
-    if where is None:
-        raise CmmUqError("no records are kept here", fix="Start the desk without CMM_UQ_RECORDS=none to keep them")
-    if not is_url(where) and not Path(where).exists():
-        raise CmmUqError("no certificate is recorded here yet", fix="Make the first one on the desk")
-    return Site(where, desk=True, account=account)
-
-
-def page(
-    method: str, path: str, query: Mapping[str, str], headers: Mapping[str, str], body: str | None, account: bool
-) -> dict[str, Any]:
-    """An answer of the records' pages; ``body``: file that holds what was sent."""
-    content = Path(body).read_bytes() if body else b""
-    answer = _site(account).answer(
-        WebRequest(method, path, query, headers, io.BytesIO(content) if body else None, len(content))
-    )
-    return {
-        "status": int(answer.status),
-        "media": answer.media,
-        "policy": answer.policy,
-        "referrer": answer.referrer,
-        "headers": dict(answer.headers),
-        "body": base64.b64encode(answer.body).decode(),
-    }
-
-
 DOES: Mapping[str, Callable[..., Any]] = {
     "first_keys": exports.first_keys,
     "read": exports.read,
@@ -214,8 +147,6 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "facts": questions.facts,
     "with_facts": questions.with_facts,
     "report": report,
-    "results": results,
-    "page": page,
     "verification": verification,
     "ready": lambda: True,
 }
@@ -232,7 +163,8 @@ def answer(line: str, tell: Tell) -> dict[str, Any]:
     except MemoryError:
         return {"refused": ["", "needs more memory than the desk gives to a file", "Export the part that is needed"]}
     except Exception as error:  # a fault is told on the page; the worker goes on
-        return {"fault": f"{type(error).__name__}: {error}"}
+        told = f"a fault of the program: {type(error).__name__}: {error}"
+        return {"refused": ["", told, "Please report it"], "fault": True}
 
 
 def limit_memory(most: int) -> None:

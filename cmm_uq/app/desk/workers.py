@@ -1,18 +1,15 @@
 """The processes that read and compute for the desk: asked, waited for no longer than it may take, and ended.
 
-What the desk hands on: files of its folder in a sandbox, pages of the records by the worker, its own style and script.
+What the desk hands on: files of its folder, in a sandbox.
 """
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import queue
-import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -23,11 +20,10 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from cmm_uq.app.desk.place import below
-from cmm_uq.app.serve.exchange import LARGEST, RefusedRequest, WebRequest, WebResponse, sent_file, style
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, sent_file
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
-from cmm_uq.base.messages import Verbatim, say
-from cmm_uq.certificate.look import template_folder
+from cmm_uq.base.messages import Verbatim
 
 MEMORY = 4 * 2**30  # bytes that reading a file may take, the libraries among them
 PATIENCE_S = 60.0  # for an answer; the largest file that is read takes a few
@@ -74,7 +70,11 @@ class Worker:
             for line in self.lines(do, seconds, given):
                 if "found" in line:
                     return line["found"]
-                _refuse(line)
+                if "refused" in line:
+                    where, problem, fix = line["refused"]
+                    if "fault" in line:
+                        raise RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, Verbatim(problem), Verbatim(fix))
+                    raise CmmUqError(problem, where=where or None, fix=fix or None)
         raise CmmUqError("ended without an answer", where=do)
 
     def lines(self, do: str, seconds: float, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
@@ -101,7 +101,7 @@ class Worker:
                 return
             line = json.loads(text)
             yield line
-            if not {"found", "refused", "fault"}.isdisjoint(line):
+            if not {"found", "refused"}.isdisjoint(line):
                 return
 
     def end(self) -> None:
@@ -127,15 +127,6 @@ def _pumped(out: IO[str], lines: queue.Queue[str | None]) -> None:
     lines.put(None)
 
 
-def _refuse(line: Mapping[str, Any]) -> None:
-    if "refused" in line:
-        where, problem, fix = line["refused"]
-        raise CmmUqError(problem, where=where or None, fix=fix or None)
-    if "fault" in line:
-        told = say("a fault of the program: {what}", what=Verbatim(line["fault"]))
-        raise RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it"))
-
-
 class ReportRun:
     """A report under way, in a process of its own; ``part`` of it is done, ``found`` and ``problem`` at its end.
 
@@ -145,7 +136,7 @@ class ReportRun:
     def __init__(self, root: Path, job: str, done: Callable[[Mapping[str, Any]], None]) -> None:
         self.job, self.what, self.part, self.since = job, "Starting", 0.0, time.monotonic()
         self.found: dict[str, Any] | None = None
-        self.problem: tuple[str, str, str] | None = None
+        self.problem: list[str] | None = None  # where, what, and how to mend it
         self.cancelled = self.over = False
         self._worker, self._changed, self._done = Worker(root, 0), threading.Condition(), done
         self._worker.begin()  # or it could be cancelled before it is there
@@ -160,10 +151,7 @@ class ReportRun:
                 if "found" in line:
                     self.found, self.over = line["found"], True
                 elif "refused" in line:
-                    where, problem, fix = line["refused"]
-                    self.problem, self.over = (where, problem, fix), True
-                elif "fault" in line:
-                    self.problem, self.over = ("", f"a fault of the program: {line['fault']}", "Please report it"), True
+                    self.problem, self.over = line["refused"], True
                 else:
                     self.what, self.part = line["what"], line["part"]
                 self._changed.notify_all()
@@ -198,18 +186,6 @@ class ReportRun:
                 self._changed.wait(BEAT_S)
 
 
-OWN_FILES = {
-    "/desk.js": "text/javascript; charset=utf-8",
-    "/icon.svg": "image/svg+xml",
-    "/style.css": "text/css; charset=utf-8",
-}
-
-
-def own_file(path: str) -> WebResponse:
-    content = style() if path == "/style.css" else (template_folder() / "serve" / path[1:]).read_bytes()
-    return WebResponse(content, OWN_FILES[path])
-
-
 def shown_file(root: Path, request: WebRequest) -> WebResponse:
     """A file of the folder, in a sandbox; only the desk's own pages may frame it."""
     request.only(("at", "keep"))
@@ -218,43 +194,3 @@ def shown_file(root: Path, request: WebRequest) -> WebResponse:
     answer = sent_file(path.name, content, keep=bool(request.one_of("keep", ("yes",))))
     policy = answer.policy.replace("frame-ancestors 'none'", "frame-ancestors 'self'")
     return replace(answer, policy=policy, headers={**answer.headers, "X-Frame-Options": "SAMEORIGIN"})
-
-
-def records_page(worker: Worker, request: WebRequest, *, account: bool) -> WebResponse:
-    """A page of the records, made by the worker."""
-    headers = {name: value for name, value in request.headers.items() if name == "content-type"}
-    given: dict[str, Any] = {
-        "method": request.method,
-        "path": request.path,
-        "query": dict(request.query),
-        "headers": headers,
-        "account": account,
-    }
-    if request.body is None:
-        return _answered(worker.ask("page", body=None, **given))
-    if request.length > LARGEST:
-        problem = say("the file is larger than {most} MB", most=LARGEST // 2**20)
-        fix = say("No certificate is; check that it is the right file")
-        raise RefusedRequest(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, problem, fix)
-    with tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder:
-        path = Path(folder) / "sent"
-        with path.open("wb") as file:
-            shutil.copyfileobj(_LimitedBody(request), file)
-        return _answered(worker.ask("page", body=str(path), **given))
-
-
-class _LimitedBody:
-    """The body of a request, as long as it says that it is."""
-
-    def __init__(self, request: WebRequest) -> None:
-        self._body, self._left = request.body, request.length
-
-    def read(self, size: int = 2**16) -> bytes:
-        block = self._body.read(min(size, self._left)) if self._body is not None and self._left else b""
-        self._left -= len(block)
-        return block
-
-
-def _answered(found: Mapping[str, Any]) -> WebResponse:
-    body, status = base64.b64decode(found["body"]), HTTPStatus(found["status"])
-    return WebResponse(body, found["media"], status, found["policy"], found["referrer"], found["headers"])

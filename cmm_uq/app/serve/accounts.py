@@ -20,29 +20,18 @@ import ssl
 import threading
 import time
 import tomllib
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from typing import Literal, get_args
 
-from cmm_uq import __version__
-from cmm_uq.app.serve.exchange import (
-    ACCOUNT,
-    DESK,
-    OWN,
-    RefusedRequest,
-    WebRequest,
-    WebResponse,
-    read_form,
-    refusal,
-    render_page,
-)
-from cmm_uq.app.serve.page import FormEntry, PageForm, PageNotice, PageParagraph, Press, WebPage
+from cmm_uq.app.serve.exchange import ACCOUNT, DESK, RefusedRequest, WebRequest, WebResponse, read_form, refusal, to
+from cmm_uq.app.serve.page import WebPage, page
 from cmm_uq.app.serve.server import peer_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.output.staging import replace_file
 
 Role = Literal["read", "work"]
@@ -176,7 +165,7 @@ class Accounts:
         if not read_accounts(path):
             raise CmmUqError("holds no account", where=str(path), fix="Add one with --add-account NAME:ROLE")
 
-    def admit(self, request: WebRequest, url: str) -> WebResponse | None:
+    def admit(self, request: WebRequest, url: str) -> WebPage | WebResponse | None:
         """An answer for whoever is not signed in, signs in or out; ``None`` for a request that may go on."""
         if request.path in ("/style.css", "/icon.svg") and request.method != "POST":
             return None
@@ -190,7 +179,7 @@ class Accounts:
                 raise RefusedRequest(
                     HTTPStatus.FORBIDDEN, say("nobody is signed in"), say("Sign in, and send it again")
                 )
-            return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": ACCOUNT})
+            return to(ACCOUNT)
         if request.method == "POST" and session.account.role == "read" and request.path not in self._harmless:
             problem = say("the account {name} may only look", name=Verbatim(session.name))
             raise RefusedRequest(HTTPStatus.FORBIDDEN, problem, say("Ask for the role work"))
@@ -202,25 +191,8 @@ class Accounts:
             return self._to(ACCOUNT, f"{self._cookie}=; Max-Age=0")
         return None
 
-    def around(
-        self, answer: Callable[[WebRequest | RefusedRequest], WebResponse]
-    ) -> Callable[[WebRequest | RefusedRequest], WebResponse]:
-        """The answers of a site, for whoever is signed in."""
-
-        def guarded(request: WebRequest | RefusedRequest) -> WebResponse:
-            try:
-                admitted = None if isinstance(request, RefusedRequest) else self.admit(request, "")
-            except RefusedRequest as refused:
-                return _rendered(refusal(refused))
-            except CmmUqError as error:
-                return _rendered(refusal(RefusedRequest(HTTPStatus.SERVICE_UNAVAILABLE, Verbatim(error.problem))))
-            return admitted or answer(request)
-
-        return guarded
-
     def _token(self, request: WebRequest) -> str:
-        cookies = (part.strip().partition("=") for part in request.headers.get("cookie", "").split(";"))
-        return next((value for name, _, value in cookies if name == self._cookie), "")
+        return cookie_of(request, self._cookie)
 
     def _session(self, request: WebRequest) -> SignedIn | None:
         session = self._sessions.get(self._token(request))
@@ -233,19 +205,19 @@ class Accounts:
             return None
         return session
 
-    def _signed_in(self, request: WebRequest) -> WebResponse:
+    def _signed_in(self, request: WebRequest) -> WebPage | WebResponse:
         form = read_form(request)
         name, password = form.get("name", "")[:LONGEST], form.get("password", "")
         with self._one:  # one guess at a time: of many sent at once none is free of waiting, and memory is that of one
             return self._guessed(request, name, password)
 
-    def _guessed(self, request: WebRequest, name: str, password: str) -> WebResponse:
+    def _guessed(self, request: WebRequest, name: str, password: str) -> WebPage | WebResponse:
         whose = ("address", str(peer_of(request.peer))), ("name", name)
         wait = max(map(self._wait, whose))
         if wait > 0:
             problem = say("too many guesses: wait {seconds} s", seconds=int(wait) + 1)
-            page = refusal(RefusedRequest(HTTPStatus.TOO_MANY_REQUESTS, problem))
-            return _rendered(page, {"Retry-After": str(int(wait) + 1)})
+            refused = refusal(RefusedRequest(HTTPStatus.TOO_MANY_REQUESTS, problem))
+            return refused._replace(headers={"Retry-After": str(int(wait) + 1)})
         account = read_accounts(self._path).get(name)
         key = _key(password, account.salt if account else b"0" * 16)
         if account is None or not secrets.compare_digest(key, account.key):
@@ -279,31 +251,12 @@ class Accounts:
         kept = f"{cookie}; Secure; HttpOnly; SameSite=Strict; Path=/"
         return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": path, "Set-Cookie": kept})
 
-    def _page(self, session: SignedIn | None, *, wrong: bool = False) -> WebResponse:
-        if session is not None:
-            roles: dict[Role, Text] = {
-                "read": say("may look at everything"),
-                "work": say("may make and change jobs and certificates"),
-            }
-            told = PageParagraph(say("{name} {may}.", name=Verbatim(session.name), may=roles[session.account.role]))
-            return _rendered(WebPage(say("Signed in"), ACCOUNT, NOTHING, (told, Press(SIGN_OUT, say("Sign out")))))
-        fields = (FormEntry("name", say("Name")), FormEntry("password", say("Password"), sort="password"))
-        form = PageForm(ACCOUNT, fields, (("sign-in", say("Sign in")),))
-        notice = (PageNotice(say("Name or password is wrong"), "bad"),) if wrong else ()
-        page = WebPage(say("Sign in"), ACCOUNT, NOTHING, (*notice, form))
-        return _rendered(page._replace(status=HTTPStatus.FORBIDDEN) if wrong else page)
-
-
-def _rendered(page: WebPage, headers: Mapping[str, str] | None = None) -> WebResponse:
-    foot = (say("cmm-uq {version}", version=Verbatim(__version__)),)
-    return WebResponse(
-        render_page(page, foot, account=True), status=page.status, referrer="same-origin", headers=headers or {}
-    )
+    def _page(self, session: SignedIn | None, *, wrong: bool = False) -> WebPage:
+        shown = page("account.html", ACCOUNT, session=session, wrong=wrong)
+        return shown._replace(status=HTTPStatus.FORBIDDEN) if wrong else shown
 
 
 OPEN = "/open"
-POLICY = OWN.replace("style-src", "script-src 'self'; connect-src 'self'; frame-src 'self'; style-src")
-"""What a page of the desk may load: what records' pages may, the desk's own script, its events, and documents in frames."""
 
 
 class Guard:
@@ -326,8 +279,7 @@ class Guard:
             raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the request came from another site"))
         if request.method == "POST" and "origin" not in request.headers and "sec-fetch-site" not in request.headers:
             raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the request does not say from which page it comes"))
-        cookies = (part.strip().partition("=") for part in request.headers.get("cookie", "").split(";"))
-        if not any(name == self._cookie and same(value, self._session) for name, _, value in cookies):
+        if not same(cookie_of(request, self._cookie), self._session):
             problem = say("this browser has not opened the desk")
             raise RefusedRequest(HTTPStatus.FORBIDDEN, problem, say("Open the link that cmm-uq desk printed"))
         return None
@@ -348,6 +300,11 @@ class Guard:
             )
         cookie = f"{self._cookie}={self._session}; HttpOnly; SameSite=Strict; Path=/"
         return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": DESK, "Set-Cookie": cookie})
+
+
+def cookie_of(request: WebRequest, name: str) -> str:
+    cookies = (part.strip().partition("=") for part in request.headers.get("cookie", "").split(";"))
+    return next((value for own, _, value in cookies if own == name), "")
 
 
 def same(stated: str, secret: str) -> bool:

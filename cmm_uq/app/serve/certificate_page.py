@@ -48,20 +48,14 @@ def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
         origin = p.ORIGINS.get(one.origin, Verbatim(one.origin))
         lead = say("Machine {machine}, {origin:small} recording of {day}", machine=machine, day=date, origin=origin)
     values = [(value.quantity, value.unit, value) for value in one.values]
-    diagnosis = results_of(files, folder).get("diagnosis")
-    return p.WebPage(
-        title,
-        "/certificates",
-        lead=lead,
-        above=(p.Cell(say("Certificates"), "/certificates"), machine_cell(one.machine)),
-        blocks=(*_notices(one), _facts(view, one, entry)),
-        sections=(
-            (say("Values"), (values_table(say("Values as stated"), values, say("It states no value."), heard=True),)),
-            *(diagnosis_section(diagnosis) if isinstance(diagnosis, Mapping) else ()),
-            *_signatures(view, one),
-            (say("Files"), (_files(one, files),)),
-        ),
-    )
+    decided, standing = decided_words(one)
+    return p.page(
+        "certificate.html", "/certificates", title=title, lead=lead, machine=machine_cell(one.machine),
+        warning=p.NOT_MEASURED.get(one.origin), decided=decided, standing=standing, told=_facts(view, one, entry),
+        values=values_table(say("Values as stated"), values, say("It states no value."), heard=True),
+        diagnosis=diagnosed(results_of(files, folder).get("diagnosis")), signatures=_signatures(view, one),
+        files=_files(one, files),
+    )  # fmt: skip
 
 
 def recorded_file(view: SiteView, request: WebRequest) -> WebResponse:
@@ -90,21 +84,19 @@ def _named(view: SiteView, request: WebRequest) -> tuple[RecordedCertificate, En
     return one, entry
 
 
-def _notices(one: RecordedCertificate) -> list[p.PageNotice]:
-    """What it decides and whether it holds, taken together as the worse of both; before that, that nothing was measured."""
-    warning = p.NOT_MEASURED.get(one.origin)
-    notices = [p.PageNotice(warning, "open")] if warning is not None else []
+def decided_words(one: RecordedCertificate) -> tuple[Text, Standing]:
+    """What it decides and whether it holds, taken together as the worse of both; nothing of a diagnosis."""
     if one.command != "report":
-        return notices
+        return NOTHING, "open"
     state, stands = p.STATES.get(one.state, (Verbatim(one.state), "open"))
     decision, conforms = p.DECISIONS.get(one.decision, (Verbatim(one.decision), "open"))
     worse: Standing = max(stands or "good", conforms or "good", key=("good", "open", "bad").index)
     if one.decision == "none":
-        return [*notices, p.PageNotice(say("{state}; it states no conformity", state=state), worse)]
-    return [*notices, p.PageNotice(say("{state}; decision: {decision:small}", state=state, decision=decision), worse)]
+        return say("{state}; it states no conformity", state=state), worse
+    return say("{state}; decision: {decision:small}", state=state, decision=decision), worse
 
 
-def _facts(view: SiteView, one: RecordedCertificate, entry: Entry) -> p.PageFacts:
+def _facts(view: SiteView, one: RecordedCertificate, entry: Entry) -> list[tuple[Text, p.Cell]]:
     artefact = any(row.serial == one.artefact for row in view.records.artefacts())
     stated = Verdicts.of_results(entry.data)
     rows: list[tuple[Text, p.Cell]] = [(say("Decision"), p.cell_of(p.DECISIONS, one.decision))]
@@ -126,10 +118,10 @@ def _facts(view: SiteView, one: RecordedCertificate, entry: Entry) -> p.PageFact
         (say("Made by"), p.Cell(say("cmm-uq {version}", version=Verbatim(one.version)) if one.version else DASH)),
         (say("Entry of the records"), p.Cell(number(one.entry), note=Verbatim(entry.hash))),
     ]
-    return p.PageFacts(tuple(rows))
+    return rows
 
 
-def _signatures(view: SiteView, one: RecordedCertificate) -> tuple[p.Section, ...]:
+def _signatures(view: SiteView, one: RecordedCertificate) -> p.PageTable:
     words = {"release": say("Released"), "withdrawal": say("Withdrawn"), "replacement": say("Replaced")}
     headings = p.columns(say("What"), say("By"), say("When"), say("Reason"), say("In its place"))
     rows = tuple(
@@ -139,8 +131,7 @@ def _signatures(view: SiteView, one: RecordedCertificate) -> tuple[p.Section, ..
          p.Cell(say("entry {number}", number=number(each.replaced_by)), p.address("/certificate", entry=each.replaced_by)))
         for each in view.records.signatures(one.entry)
     )  # fmt: skip
-    table = p.PageTable(say("Who released, withdrew or replaced it"), headings, rows, heard=True)
-    return ((say("Release"), (table,)),) if rows else ()
+    return p.PageTable(say("Who released, withdrew or replaced it"), headings, rows, heard=True)
 
 
 def _files(one: RecordedCertificate, files: tuple[RecordedFile, ...]) -> p.PageTable:
@@ -160,23 +151,29 @@ def _files(one: RecordedCertificate, files: tuple[RecordedFile, ...]) -> p.PageT
     return p.PageTable(say("Files as recorded"), headings, rows, empty, (note,), heard=True)
 
 
-def diagnosis_section(diagnosis: Mapping[str, Any]) -> tuple[p.Section, ...]:
-    if not diagnosis.get("verdict"):
-        return ()
+class Diagnosed(NamedTuple):
+    """A diagnosis as results.json has it, in words."""
+
+    facts: list[tuple[Text, p.Cell]]
+    effects: p.PageTable | None
+    sentences: list[Text]
+
+
+def diagnosed(diagnosis: Any) -> Diagnosed | None:
+    if not isinstance(diagnosis, Mapping) or not diagnosis.get("verdict"):
+        return None
     facts: list[tuple[Text, p.Cell]] = [(say("Verdict"), p.cell_of(p.VERDICTS, str(diagnosis["verdict"])))]
     if isinstance(p_value := diagnosis.get("p_value"), (int, float)):
         facts.append((say("Lack-of-fit test, p"), p.Cell(probability(float(p_value)))))
-    blocks: list[p.Block] = [p.PageFacts(tuple(facts))]
-    if rows := tuple(filter(None, map(_effect, _list(diagnosis.get("effects"))))):
-        headings = p.columns(say("Effect"), (say("Probability"), "number"), say("Size"))
-        blocks.append(p.PageTable(say("What the model leaves out"), headings, rows))
-    for group in _list(diagnosis.get("indistinguishable")):
-        if isinstance(group, list):
-            names = commas(effect_title(str(name)) for name in group)
-            blocks.append(p.PageParagraph(say("This recording cannot tell apart: {names}.", names=names)))
+    rows = tuple(filter(None, map(_effect, _list(diagnosis.get("effects")))))
+    headings = p.columns(say("Effect"), (say("Probability"), "number"), say("Size"))
+    effects = p.PageTable(say("What the model leaves out"), headings, rows) if rows else None
+    alike = [group for group in _list(diagnosis.get("indistinguishable")) if isinstance(group, list)]
+    each = [commas(effect_title(str(name)) for name in group) for group in alike]
+    sentences: list[Text] = [say("This recording cannot tell apart: {names}.", names=names) for names in each]
     further = [one.get("what") for one in _list(diagnosis.get("suggested_measurements")) if isinstance(one, Mapping)]
-    blocks += [p.PageParagraph(say("Measure next: {what}", what=Verbatim(str(what)))) for what in further if what]
-    return ((say("Diagnosis"), tuple(blocks)),)
+    sentences += [say("Measure next: {what}", what=Verbatim(str(what))) for what in further if what]
+    return Diagnosed(facts, effects, sentences)
 
 
 def _effect(one: Any) -> tuple[p.Cell, ...]:

@@ -4,7 +4,7 @@ An address that cannot be read is refused in words, never guessed at. A dropped 
 taken, nothing of it kept on the disk. Its form has one field, so that its parts (RFC 7578) need no parser: the file is what
 stands between the first empty line and the last boundary.
 
-Pages as HTML by the one template, their style sheet, and a page in words for whatever goes wrong.
+What goes wrong is a page in words.
 """
 
 from __future__ import annotations
@@ -12,23 +12,19 @@ from __future__ import annotations
 import datetime as dt
 import hashlib
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from http import HTTPStatus
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import BinaryIO
 from urllib.parse import parse_qsl, quote, urlsplit
 
-from cmm_uq.app.serve.page import CHART, Cell, Chart, PageNotice, WebPage, kind
+from cmm_uq.app.serve.page import WebPage, address, page
 from cmm_uq.base.errors import printable, shortened, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
-from cmm_uq.certificate.look import BAND, COLOURS, template_folder
 
-if TYPE_CHECKING:
-    from jinja2 import Environment
-    from markupsafe import Markup
-
+DESK = "/desk"  # where the pages of a desk begin
+ACCOUNT = "/account"
 LONGEST_VALUE = 300  # characters of one value of a query: the longest serial or job id that the records take is shorter
 MOST_VALUES = 20
 MOST_FIELDS, LONGEST_FORM = 1000, 4_000_000  # of a form; job.toml has a million characters at most
@@ -36,10 +32,10 @@ LAST_PAGE = 10**6
 
 
 class RefusedRequest(Exception):  # noqa: N818 - what it is, in the words of the answer
-    """A request that is answered with a page in words instead of what it asked for."""
+    """A request that is answered with a page in words instead of what it asked for; ``title``: where another says more."""
 
-    def __init__(self, status: HTTPStatus, problem: Text, fix: Text = NOTHING) -> None:
-        self.status, self.problem, self.fix = status, problem, fix
+    def __init__(self, status: HTTPStatus, problem: Text, fix: Text = NOTHING, title: Text = NOTHING) -> None:
+        self.status, self.problem, self.fix, self.title = status, problem, fix, title
         super().__init__(str(problem))
 
 
@@ -95,8 +91,9 @@ class WebRequest:
         try:
             return dt.date.fromisoformat(value)
         except ValueError:
-            raise bad(say("{name} is a date such as 2026-03-31, not {value!r}", name=Verbatim(name),
-                          value=_short(value))) from None  # fmt: skip
+            raise bad(
+                say("{name} is a date such as 2026-03-31, not {value!r}", name=Verbatim(name), value=_short(value))
+            ) from None
 
 
 def read_address(target: str) -> tuple[str, dict[str, str]]:
@@ -113,8 +110,9 @@ def read_address(target: str) -> tuple[str, dict[str, str]]:
         if name in query:
             raise bad(say("{name!r} stands twice in the address", name=_short(name)))
         if len(value) > LONGEST_VALUE or any(c in value for c in "\0\r\n"):
-            raise bad(say("{name!r} in the address is longer than any name, or holds what no name holds",
-                          name=_short(name)))  # fmt: skip
+            raise bad(
+                say("{name!r} in the address is longer than any name, or holds what no name holds", name=_short(name))
+            )
         query[name] = value
     return parts.path, query
 
@@ -295,86 +293,15 @@ def _read(body: BinaryIO, length: int, boundary: bytes, keep: Callable[[bytes], 
     return name, size, sha256.hexdigest()
 
 
-DESK = "/desk"  # where the pages of a desk begin
-ACCOUNT = "/account"
-CONTENTS: tuple[tuple[str, Text], ...] = (
-    ("/", say("Machines")), ("/certificates", say("Certificates")), ("/diagnoses", say("Diagnoses")),
-    ("/artefacts", say("Artefacts")), ("/file", say("Check a file")), ("/integrity", say("Integrity")),
-)  # fmt: skip
-WORDS: dict[str, Text] = {  # what stands around every page
-    "site": say("Calibration records"), "skip": say("To the content"), "contents": say("Contents"),
-    "above": say("Belongs to"),
-}  # fmt: skip
+def to(path: str, **query: str) -> WebResponse:
+    """After a form: a page to be got, so that reload sends nothing again."""
+    return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": address(path, **query)})
 
 
-def render_page(page: WebPage, foot: Sequence[Text], *, desk: bool = False, account: bool = False) -> bytes:
-    """``desk``: whether the site is a desk's, whose own pages have a script; ``account``: whether somebody signed in."""
-    contents, words = (
-        (((DESK, say("Desk")), *CONTENTS), WORDS | {"site": say("Calibration desk")}) if desk else (CONTENTS, WORDS)
-    )
-    if account:
-        contents = *contents, (ACCOUNT, say("Account"))
-    template = _environment().get_template("page.html")
-    script = "/desk.js" if page.place == DESK else ""
-    return template.render(page=page, foot=foot, contents=contents, words=words, script=script).encode()
-
-
-def refusal(refused: RefusedRequest, title: Text | None = None) -> WebPage:
+def refusal(refused: RefusedRequest) -> WebPage:
     """A page in words for a request that is answered with nothing else."""
     titles = {HTTPStatus.NOT_FOUND: say("Not found"), HTTPStatus.INTERNAL_SERVER_ERROR: say("A fault")}
-    head = title or titles.get(refused.status, say("This cannot be shown"))
-    problem = say("{problem:capital}.", problem=refused.problem)
-    lines = (Cell(say("{fix}.", fix=refused.fix)),) if refused.fix else ()
-    return WebPage(head, "", lead=NOTHING, blocks=(PageNotice(problem, "bad", lines),), status=refused.status)
-
-
-def fault(error: Exception) -> RefusedRequest:
-    """A fault of the program, told on its page; the others go on."""
-    told = say("a fault of the program: {what}", what=Verbatim(f"{type(error).__name__}: {error}"))
-    return RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it"))
-
-
-@cache
-def style() -> bytes:
-    """The style sheet, in the colours of the documents."""
-    colours = {**COLOURS, "band": BAND}
-    return _environment().get_template("style.css").render(colour=colours).encode()
-
-
-@cache
-def _environment() -> Environment:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(template_folder() / "serve"), autoescape=True, undefined=StrictUndefined,
-        finalize=_visible, trim_blocks=True, lstrip_blocks=True, auto_reload=False,
-    )  # fmt: skip
-    environment.filters |= {"picture": _picture, "kind": kind, "drawn": _drawn, "source": _source}
-    return environment
-
-
-def _visible(value: Any) -> Any:
-    """A text with what would turn it round, or hide in it, written as an escape."""
-    return printable(str.__str__(value)) if isinstance(value, str) and not hasattr(value, "__html__") else value
-
-
-def _picture(chart: Chart) -> Markup:
-    """A picture with its alternative text; its elements were drawn here, of numbers and escaped words."""
-    from markupsafe import Markup, escape
-
-    size, label = "0 0 {} {}".format(*CHART), escape(printable(chart.alternative))
-    return Markup(f'<svg viewBox="{size}" role="img" aria-label="{label}">{chart.svg}</svg>')  # noqa: S704 - nothing in it is from elsewhere
-
-
-def _drawn(svg: str) -> Markup:
-    """A drawing of this program."""
-    from markupsafe import Markup
-
-    return Markup(svg)  # noqa: S704 - nothing in it is from elsewhere
-
-
-def _source(text: str, *, exact: bool = False) -> Markup:
-    """A text of several lines; ``exact``: as it is, to be changed and sent back."""
-    from markupsafe import escape
-
-    return escape(text if exact else "\n".join(map(printable, text.split("\n"))))
+    title = refused.title or titles.get(refused.status, say("This cannot be shown"))
+    return page("refusal.html", "", title=title, problem=refused.problem, fix=refused.fix)._replace(
+        status=refused.status
+    )

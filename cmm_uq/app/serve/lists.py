@@ -6,6 +6,7 @@ import datetime as dt
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
+from typing import Any
 
 from cmm_uq.app.serve import page as p, view as v
 from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, bad
@@ -22,36 +23,42 @@ _KEYS = ("text", "machine", "artefact", "origin", "state", "decision", "since", 
 
 
 def _list(
-    request: WebRequest, title: Text, lead: Text, choose: Text, fields: Iterable[p.FormField], table: p.PageTable, total: int,
-    *, clear: Text, above: tuple[p.Block, ...] = (), between: tuple[p.Block, ...] = (), kept: tuple[str, ...] = (),
+    request: WebRequest, title: Text, lead: Text, choose: Text, fields: Iterable[p.FormEntry], rows: p.PageTable, total: int,
+    *, clear: Text, kept: tuple[str, ...] = (), **further: Any,
 ) -> p.WebPage:  # fmt: skip
     """A page of a list: the form that narrows it, its rows, and where in it the reader is."""
     given = tuple((name, request.text(name)) for name in kept if request.text(name))
-    reset = p.Cell(clear, request.path) if _narrowed(request) else None
-    form = p.Chooser(choose, request.path, tuple(fields), say("Show"), reset, given)
-    blocks = (*above, *((form,) if form.fields else ()), *between, table, *v.pager(request, total, table.caption))
-    return p.WebPage(title, request.path, lead, blocks)
+    usual = {
+        "counts": (),
+        "overdue": None,
+        "warning": None,
+        "narrowed": _narrowed(request),
+        "clear": clear,
+        "kept": given,
+    }
+    return p.page("list.html", request.path, title=title, lead=lead, choose=choose, fields=tuple(fields), rows=rows,
+                  pager=v.pager(request, total, rows.caption), **{**usual, **further})  # fmt: skip
 
 
 def _narrowed(request: WebRequest) -> bool:
     return any(request.text(name) for name in request.query if name != "page")
 
 
-def _field(request: WebRequest, name: str, label: Text, *options: tuple[str, Text], usual: str = "") -> p.FormField:
+def _field(request: WebRequest, name: str, label: Text, *options: tuple[str, Text], usual: str = "") -> p.FormEntry:
     """A line of text, or a choice where there are options, with what was chosen."""
-    return p.FormField(name, label, request.text(name) or usual, options, "select" if options else "search")
+    return p.FormEntry(name, label, request.text(name) or usual, "select" if options else "search", options)
 
 
 def _options(words: Mapping[str, p.Word]) -> tuple[tuple[str, Text], ...]:
     return tuple((name, text) for name, (text, _) in words.items())
 
 
-def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None, tuple[p.FormField, ...]]:
+def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None, tuple[p.FormEntry, ...]]:
     since, until = request.day("since"), request.day("until")
     if since is not None and until is not None and since > until:
         raise bad(say("the list would end before it begins"), say("Exchange the two dates"))
     ends = (("since", say("From")), ("until", say("To")))
-    return since, until, tuple(p.FormField(name, label, request.text(name), sort="date") for name, label in ends)
+    return since, until, tuple(p.FormEntry(name, label, request.text(name), "date") for name, label in ends)
 
 
 def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
@@ -80,11 +87,10 @@ def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         lead = say("Of machine {serial}, newest first.", serial=Verbatim(machine))
     elif artefact:
         lead = say("Made with artefact {serial}, newest first.", serial=Verbatim(artefact))
-    warning = p.NOT_MEASURED.get(origin)
     return _list(
         request, say("Certificates"), lead, say("Choose certificates"), fields,
         v.certificates_table(rows, count, say("No certificate is as chosen.") if _narrowed(request) else none), total,
-        clear=say("Show all"), between=(p.PageNotice(warning, "open"),) if warning else (), kept=("machine", "artefact"),
+        clear=say("Show all"), warning=p.NOT_MEASURED.get(origin), kept=("machine", "artefact"),
     )  # fmt: skip
 
 
@@ -173,10 +179,11 @@ def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     machines = view.standing()
     found = [one for one in machines if _has(one, text.casefold(), state, place)]
     counts = Counter(group for one in machines for group in one.groups)
-    tally = tuple(
-        p.Count(counts[name], group.count, "/" if name == state else p.address("/", state=name), group.standing, name == state)
+    tally = [
+        {"number": counts[name], "what": group.count, "address": "/" if name == state else p.address("/", state=name),
+         "standing": group.standing, "chosen": name == state}
         for name, group in v.GROUPS.items() if counts[name] or name in ("overdue", "failing", "due", "order")
-    )  # fmt: skip
+    ]  # fmt: skip
     rows = tuple(_row(one) for one in v.on_page(found, request))
     count = plural(len(found), one=say("1 machine"), many=say("{count} machines", count=number(len(found), ",d")))
     empty = say("No machine is as chosen.") if machines else say("No machine is recorded yet.")
@@ -189,7 +196,7 @@ def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     return _list(
         request, say("Machines"), say("On {day}, the most urgent first.", day=day(view.today)), say("Choose machines"), fields,
         p.PageTable(count, COLUMNS, rows, empty), len(found), clear=say("Show all"),
-        above=(p.Tally(say("By state"), tally), *_overdue_artefacts(view)),
+        counts=tally, overdue=_overdue_artefacts(view),
     )  # fmt: skip
 
 
@@ -200,19 +207,21 @@ def _has(one: v.MachineStanding, text: str, state: str, place: str) -> bool:
     return chosen and (not text or any(text in name.casefold() for name in names))
 
 
-def _overdue_artefacts(view: v.SiteView) -> tuple[p.PageNotice, ...]:
+def _overdue_artefacts(view: v.SiteView) -> tuple[Text, Text] | None:
+    """How many are out of date, and which."""
     known = view.records.artefacts(view.today)
     overdue = [(one.serial, one.due) for one in known if one.due is not None and one.due < view.today]
     if not overdue:
-        return ()
+        return None
     count = len(overdue)
     head = plural(
-        count, one=say("1 artefact is out of date: no certificate can rest on it"),
+        count,
+        one=say("1 artefact is out of date: no certificate can rest on it"),
         many=say("{count} artefacts are out of date: no certificate can rest on them", count=number(count)),
-    )  # fmt: skip
+    )
     named = [say("{serial} since {day}", serial=p.shown(serial), day=day(due)) for serial, due in overdue[:MOST_NAMED]]
     more = [say("{count} more", count=number(count - MOST_NAMED))] if count > MOST_NAMED else []
-    return (p.PageNotice(head, "bad", (p.Cell(listed([*named, *more])), p.Cell(say("All artefacts"), "/artefacts"))),)
+    return head, listed([*named, *more])
 
 
 def due_cell(one: v.MachineStanding, *, why: bool = True) -> p.Cell:
@@ -247,33 +256,24 @@ def machine_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         raise RefusedRequest(HTTPStatus.NOT_FOUND, *v.problem_of(error)) from None
     standing = next((one for one in view.standing() if one.serial == machine.serial), None)
     facts = [
-        (say("Manufacturer"), p.Cell(p.shown(machine.manufacturer))), (say("Model"), p.Cell(p.shown(machine.model))),
+        (say("Manufacturer"), p.Cell(p.shown(machine.manufacturer))),
+        (say("Model"), p.Cell(p.shown(machine.model))),
         (say("Place"), p.Cell(p.shown(machine.place))),
-    ]  # fmt: skip
+    ]
     if machine.adjusted:
         facts.append((say("Adjusted on"), p.Cell(commas(day(one) for one in machine.adjusted))))
-    notices: tuple[p.PageNotice, ...] = ()
     if standing is not None:
-        head, *lines = (_group_words(standing, name) for name in standing.groups)
-        notices = (p.PageNotice(head, v.GROUPS[standing.groups[0]].standing, tuple(map(p.Cell, lines))),)
         facts.append((say("Due"), due_cell(standing)))
         if (newest := standing.newest.certificate) is not None:
             facts.append((say("Newest certificate"), v.certificate_cell(newest)))
     listed, count = chosen(view.records, CertificateFilter(machine=machine.serial), LISTED)
     caption = say("The newest {shown} of {count}", shown=number(len(listed)), count=number(count, ",d"))
-    every = p.Cell(say("All certificates of this machine"), p.address("/certificates", machine=machine.serial))
     table = v.certificates_table(listed, caption, say("No measured certificate is recorded."), machine=False)
-    lead = say("Serial number {serial}", serial=Verbatim(machine.serial))
-    if machine.by_name:
-        lead = say("Recognised by its name: its jobs state no serial number.")
-    return p.WebPage(
-        Verbatim(machine.name or machine.serial), "/", lead=lead,
-        above=(p.Cell(say("Machines"), "/"),),
-        blocks=(*notices, p.PageFacts(tuple(facts))),
-        sections=(
-            (say("Trends"), trends(view.records, machine)),
-            (say("Certificates"), (table, p.Links((every,)))),
-        ),
+    charts, once = trends(view.records, machine)
+    return p.page(
+        "machine.html", "/", machine=machine, told=facts, charts=charts, once=once, certificates=table,
+        words=[] if standing is None else [_group_words(standing, name) for name in standing.groups],
+        standing=None if standing is None else v.GROUPS[standing.groups[0]].standing,
     )  # fmt: skip
 
 

@@ -61,9 +61,10 @@ class RecordsServer(ThreadingHTTPServer):
             address = ipaddress.ip_address(bind)
         except ValueError:
             raise CmmUqError(
-                "is no address of a network card", where=f"--bind {bind}",
+                "is no address of a network card",
+                where=f"--bind {bind}",
                 fix="127.0.0.1 is this machine alone, 0.0.0.0 every network that it is in",
-            ) from None  # fmt: skip
+            ) from None
         self.address_family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
         self.alone = address.is_loopback
         try:
@@ -223,9 +224,10 @@ class _Handler(BaseHTTPRequestHandler):
         hosts = self.headers.get_all("Host", [])
         if len(hosts) != 1 or not self.server.answers_to(hosts[0].strip()):
             raise RefusedRequest(
-                HTTPStatus.MISDIRECTED_REQUEST, say("this page is not known by that name"),
+                HTTPStatus.MISDIRECTED_REQUEST,
+                say("this page is not known by that name"),
                 say("Open {url}", url=Verbatim(self.server.url)),
-            )  # fmt: skip
+            )
         path, query = read_address(self.path)
         headers = {name.lower(): value for name, value in self.headers.items()}
         return WebRequest(self.command, path, query, headers, peer=self.client_address[0])

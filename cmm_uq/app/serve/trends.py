@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from html import escape
-from itertools import pairwise
 from math import ceil, floor, isfinite, log10
+from typing import NamedTuple
 
-from cmm_uq.app.serve.page import CHART, Block, Cell, Chart, Charts, PageParagraph, PageTable, columns, shown
+from cmm_uq.app.serve.page import Cell, PageTable, columns, shown
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, number, say
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records.facts import RecordedMachine, RecordedValue
@@ -21,7 +19,7 @@ from cmm_uq.laboratory.records.listing import Course, CourseValue, courses
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.maths.uncertainty.quantity import rounded
 
-WIDTH, HEIGHT = CHART
+WIDTH, HEIGHT = 340, 150
 RIGHT, TOP, BOTTOM = 8, 8, 20
 """Of the picture and its margins, CSS pixels at its natural size; the left one is as wide as the figures in it."""
 
@@ -30,118 +28,63 @@ IN_SIGHT = 0.2  # part of a limit that the values must come to for it to be draw
 _STEPS = (1.0, 2.0, 5.0, 10.0, 20.0)
 
 
-@dataclass(frozen=True)
-class PlotFrame:
-    """Where days (``first`` and ``last`` at its ends) and values lie in the picture."""
+class TrendMark(NamedTuple):
+    """Where one value and the ends of its interval lie; ``joined``: to the one before it."""
 
-    first: float
-    last: float
-    low: float
-    high: float
-
-    @property
-    def left(self) -> float:
-        longest = max((len(text) for text in ticks(self.low, self.high)[1]), default=0)
-        return 10 + DIGIT * min(longest, 15)
-
-    def x(self, day: float) -> float:
-        return self.left + (WIDTH - self.left - RIGHT) * (day - self.first) / (self.last - self.first)
-
-    def y(self, value: float) -> float:
-        return TOP + (HEIGHT - TOP - BOTTOM) * (self.high - value) / (self.high - self.low)
+    x: float
+    y: float
+    lower: float
+    upper: float
+    interim: bool
+    joined: bool
 
 
-@dataclass(frozen=True)
-class Trend:
-    """One value of one machine over time.
+class TrendPicture:
+    """One value of one machine over time: where its days and values lie in the picture.
 
-    ``days``: of the measurements, ascending, proleptic Gregorian ordinals; ``values, lower, upper``: in the unit,
-    with the stated interval; ``interim``: whether each is of an interim check; ``parted``: whether the machine was
-    adjusted between each and the next, one fewer; ``adjusted``: days of adjustments; ``limit``: of its amount;
+    ``stated``: oldest first; ``adjusted``: days of adjustments, proleptic Gregorian ordinals; ``limit``: of its amount;
     ``None`` where none is set.
     """
 
-    days: Sequence[int]
-    values: Sequence[float]
-    lower: Sequence[float]
-    upper: Sequence[float]
-    interim: Sequence[bool]
-    parted: Sequence[bool] = ()
-    adjusted: Sequence[int] = ()
-    limit: float | None = None
+    width, height, right, top, foot = WIDTH, HEIGHT, WIDTH - RIGHT, TOP, HEIGHT - BOTTOM
+
+    def __init__(self, stated: Sequence[CourseValue], adjusted: Iterable[int] = (), limit: float | None = None) -> None:
+        lowest, highest = min(one.lower for one in stated), max(one.upper for one in stated)
+        reaches = () if limit is None else ((limit, highest), (-limit, -lowest))
+        # in sight of the values: the upper one, the lower one, both or none
+        self.limits = [value for value, reach in reaches if reach >= IN_SIGHT * abs(value)]
+        low, high = min([lowest, *self.limits]), max([highest, *self.limits])
+        room = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
+        self.low, self.high = low - room, high + room
+        self.figures = list(zip(*ticks(self.low, self.high), strict=True))
+        self.left = 10 + DIGIT * min(max((len(text) for _, text in self.figures), default=0), 15)
+        self.first = stated[0].day.toordinal()
+        self.last = max(stated[-1].day.toordinal(), self.first + 1)
+        self.adjusted = [day for day in adjusted if self.first <= day <= self.last]
+        before = [None, *stated[:-1]]
+        self.marks = [
+            TrendMark(self.x(one.day.toordinal()), self.y(one.value), self.y(one.lower), self.y(one.upper), one.interim,
+                 last is not None and last.adjusted_since == one.adjusted_since)
+            for last, one in zip(before, stated, strict=True)
+        ]  # fmt: skip
+
+    def x(self, day: float) -> float:
+        span = self.last - self.first
+        return self.left + (self.right - self.left) * (day - self.first + 0.03 * span) / (1.06 * span)
+
+    def y(self, value: float) -> float:
+        return TOP + (self.foot - TOP) * (self.high - value) / (self.high - self.low)
 
     @property
-    def limits(self) -> list[float]:
-        """Limits that are in sight of the values: the upper one, the lower one, both or none."""
-        if self.limit is None:
-            return []
-        return [sign * self.limit for sign, reach in ((1, max(self.upper)), (-1, -min(self.lower)))
-                if reach >= IN_SIGHT * self.limit]  # fmt: skip
+    def years(self) -> list[tuple[float, int]]:
+        """Where years begin, if there is room for two; else the first and the last day are named."""
+        years = [(self.x(day), year) for day, year in new_years(self.first, self.last)]
+        return years if len(years) > 1 else []
 
-
-def drawn(trend: Trend, limit_word: Text, adjusted_word: Text) -> str:
-    """The picture's elements, without the ``svg`` around them."""
-    first, last = trend.days[0], max(trend.days[-1], trend.days[0] + 1)
-    room = 0.03 * (last - first)
-    frame = PlotFrame(first - room, last + room, *_range([*trend.lower, *trend.upper, *trend.limits]))
-    x, y, left, right = frame.x, frame.y, frame.left, WIDTH - RIGHT
-    parts = _axes(frame, first, last)
-    parts += [f'<path class="limit" d="M{left:.1f} {y(value):.1f}H{right}"/>' for value in trend.limits]
-    if trend.limits:
-        place = y(trend.limits[0]) + (-4 if trend.limits[0] < 0 else 11)
-        parts.append(f'<text class="limit" x="{right}" y="{place:.1f}" text-anchor="end">{escape(limit_word)}</text>')
-    inside = [day for day in trend.adjusted if first <= day <= last]
-    parts += [f'<path class="adjusted" d="M{x(day - 0.5):.1f} {TOP}V{HEIGHT - BOTTOM}"/>' for day in inside]
-    if inside:
-        at = x(inside[-1])
-        anchor, shift = ("start", 3) if at < WIDTH / 2 else ("end", -3)
-        height = TOP + 9 if min(trend.limits, default=0.0) < 0 else HEIGHT - BOTTOM - 4
-        parts.append(f'<text x="{at + shift:.1f}" y="{height}" text-anchor="{anchor}">{escape(adjusted_word)}</text>')
-    rows = list(zip(trend.days, trend.values, trend.lower, trend.upper, trend.interim, strict=True))
-    joined = "".join(
-        f"{'M' if i == 0 or any(trend.parted[i - 1 : i]) else 'L'}{x(day):.1f} {y(value):.1f}"
-        for i, (day, value, *_) in enumerate(rows)
-    )
-    parts.append(f'<path class="line" d="{joined}"/>')
-    bars = "".join(f"M{x(day):.1f} {y(below):.1f}V{y(above):.1f}" for day, _, below, above, _ in rows)
-    parts.append(f'<path class="interval" d="{bars}"/>')
-    radius = 3 if len(rows) <= 40 else 1.75
-    parts += [
-        f'<circle class="{"interim" if interim else "point"}" cx="{x(day):.1f}" cy="{y(value):.1f}" r="{radius}"/>'
-        for day, value, _, _, interim in rows
-    ]
-    return "".join(parts)
-
-
-def _range(values: Sequence[float]) -> tuple[float, float]:
-    low, high = min(values), max(values)
-    room = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
-    return low - room, high + room
-
-
-def _axes(frame: PlotFrame, first: int, last: int) -> list[str]:
-    """Round figures at the left; below, the first and the last day, or where there is room the years."""
-    x, left, right = frame.x, frame.left, WIDTH - RIGHT
-    parts = [
-        f'<path class="axis" d="M{left:.1f} {frame.y(value):.1f}H{right}"/>'
-        f'<text x="{left - 6:.1f}" y="{frame.y(value) + 4:.1f}" text-anchor="end">{text}</text>'
-        for value, text in zip(*ticks(frame.low, frame.high), strict=True)
-    ]
-    below = HEIGHT - 5
-    years = [(x(day), year) for day, year in new_years(first, last)]
-    if len(years) >= 2:
-        parts += [
-            f'<path class="axis" d="M{at:.1f} {HEIGHT - BOTTOM}v4"/>'
-            f'<text x="{min(at, right - 12):.1f}" y="{below}" text-anchor="middle">{year}</text>'
-            for at, year in years
-        ]
-    else:
-        one, other = dt.date.fromordinal(first), dt.date.fromordinal(last)
-        parts.append(f'<text x="{x(first):.1f}" y="{below}">{one.isoformat()}</text>')
-        if other - one > dt.timedelta(days=1):
-            parts.append(f'<text x="{right}" y="{below}" text-anchor="end">{other.isoformat()}</text>')
-    parts.append(f'<path class="axis" d="M{left:.1f} {HEIGHT - BOTTOM}H{right}"/>')
-    return parts
+    @property
+    def days(self) -> list[str]:
+        ends = (self.first, self.last) if self.last > self.first + 1 else (self.first,)
+        return [dt.date.fromordinal(day).isoformat() for day in ends]
 
 
 def ticks(low: float, high: float, most: int = 4) -> tuple[list[float], list[str]]:
@@ -193,33 +136,30 @@ def _row(quantity: str, unit: str, one: RecordedValue | CourseValue) -> tuple[Ce
 DRAWN = 200  # certificates whose values are drawn, the newest
 FIGURES = "performance:"  # what the name of a figure of performance begins with: on these a standard decides
 
-_NOTE = say(
-    "Newest value with its stated 95 % interval, and the measured values that stand: neither withdrawn nor replaced. A line "
-    "is broken where the machine was adjusted; an open mark is an interim check."
-)
 
-
-def trends(records: Records, machine: RecordedMachine) -> tuple[Block, ...]:
-    """Figures of performance first, then what has a limit."""
+def trends(records: Records, machine: RecordedMachine) -> tuple[list[Chart], PageTable]:
+    """Figures of performance first, then what has a limit; what was stated once so far as a table."""
     found = courses(records, machine, DRAWN)
-    if not found:
-        return (PageParagraph(say("No value is recorded of this machine."), "note"),)
     ordered = sorted(found, key=lambda one: (not one.name.startswith(FIGURES), one.stated[-1].limit is None))
     adjusted = tuple(one.toordinal() for one in machine.adjusted)
-    several = tuple(_chart(one, adjusted) for one in ordered if len(one.stated) > 1)
     once = [(one.quantity, one.unit, one.stated[0]) for one in ordered if len(one.stated) == 1]
-    charts = (Charts(several, (_NOTE,)),) if several else ()
-    return (*charts, values_table(say("Stated once so far"), once, NOTHING)) if once else charts
+    charts = [_chart(one, adjusted) for one in ordered if len(one.stated) > 1]
+    return charts, values_table(say("Stated once so far"), once, NOTHING)
+
+
+class Chart(NamedTuple):
+    """A picture with the sentence that replaces it for whoever cannot see it."""
+
+    title: Text
+    told: Text
+    picture: TrendPicture
+    alternative: Text
+    standing: Standing | None = None
 
 
 def _chart(course: Course, adjusted: tuple[int, ...]) -> Chart:
     stated = course.stated
     limit = next((one.limit for one in reversed(stated) if one.limit is not None), None)
-    trend = Trend(
-        [one.day.toordinal() for one in stated], [one.value for one in stated], [one.lower for one in stated],
-        [one.upper for one in stated], [one.interim for one in stated],
-        [before.adjusted_since != one.adjusted_since for before, one in pairwise(stated)], adjusted, limit,
-    )  # fmt: skip
     newest = stated[-1]
     told = with_interval(newest, course.unit)
     beyond = limit is not None and abs(newest.value) > limit
@@ -227,8 +167,8 @@ def _chart(course: Course, adjusted: tuple[int, ...]) -> Chart:
     if limit is not None:
         allowed = say("limit {limit} {unit}", limit=number(limit, "g"), unit=Verbatim(course.unit))
         told = say("{value}, {limit}", value=told, limit=allowed)
-    return Chart(Verbatim(course.quantity), told, drawn(trend, say("limit"), say("adjusted")),
-                 _in_words(course, told, beyond=beyond), standing)  # fmt: skip
+    picture = TrendPicture(stated, adjusted, limit)
+    return Chart(Verbatim(course.quantity), told, picture, _in_words(course, told, beyond=beyond), standing)
 
 
 def _in_words(course: Course, newest: Text, *, beyond: bool) -> Text:

@@ -136,19 +136,25 @@ def paged(records: Records, choice: CertificateFilter, request: WebRequest) -> t
     return chosen(records, choice, PER_PAGE, (request.count("page") - 1) * PER_PAGE)
 
 
-def pager(request: WebRequest, count: int, what: Text) -> tuple[p.Pager, ...]:
+class Pager(NamedTuple):
+    """Where in a long list the reader is, and the addresses of the pages before and after."""
+
+    told: Text
+    before: str
+    after: str
+
+
+def pager(request: WebRequest, count: int, what: Text) -> Pager | None:
     page = request.count("page")
     if count <= PER_PAGE and page == 1:
-        return ()
+        return None
     last = max(1, -(-count // PER_PAGE))
     place = say("{what}: page {page} of {last}", what=what, page=number(page), last=number(last, ",d"))
 
-    def to(target: int, text: Text) -> Cell:
-        return Cell(text, address(request.path, **{**request.query, "page": target if target > 1 else None}))
+    def to(target: int) -> str:
+        return address(request.path, **{**request.query, "page": target if target > 1 else None})
 
-    before = to(min(page - 1, last), say("Previous page")) if page > 1 else None
-    after = to(page + 1, say("Next page")) if page < last else None
-    return (p.Pager(say("Pages"), place, before, after),)
+    return Pager(place, to(min(page - 1, last)) if page > 1 else "", to(page + 1) if page < last else "")
 
 
 def problem_of(error: CmmUqError) -> tuple[Text, Text]:

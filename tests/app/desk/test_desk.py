@@ -132,9 +132,10 @@ def test_a_worker_that_takes_too_long_or_too_much_is_ended_and_another_begun(tmp
     worker = Worker(tmp_path)
     with pytest.raises(CmmUqError, match="took longer than"):
         worker.ask("kinds", seconds=0.01)
-    small = Worker(tmp_path, memory=300_000_000)
+    small, path = Worker(tmp_path, memory=300_000_000), tmp_path / "large.csv"
+    path.write_text("1;2;3\n" * 8_000_000, encoding="utf-8")
     with pytest.raises(CmmUqError, match=r"needed more|needs more memory|has ended"):
-        small.ask("kinds")
+        small.ask("read", path=str(path), keys={})
     assert worker.ask("kinds")
     worker.end()
     small.end()

@@ -6,7 +6,6 @@ import datetime as dt
 import os
 import re
 import sqlite3
-from collections.abc import Iterator
 from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,12 +14,14 @@ from typing import Any
 import pytest
 
 from cmm_uq.app.commands.laboratory.due import due_in
+from cmm_uq.app.serve import application
 from cmm_uq.app.serve.exchange import WebRequest, read_address
 from cmm_uq.app.serve.page import WebPage
 from cmm_uq.app.serve.site import PAGES, Site
 from cmm_uq.app.serve.view import ChainComparing
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import say
+from cmm_uq.base.messages import Text, say
+from cmm_uq.certificate.look import template_folder
 from cmm_uq.laboratory.due.due import DueItem
 from cmm_uq.laboratory.records import open_records
 from tests.app.serve.conftest import Looked
@@ -337,50 +338,37 @@ def test_only_one_comparison_goes_on_at_a_time(monkeypatch: pytest.MonkeyPatch) 
     assert (checking.last.failed, checking.last.files, checking.since) == ("locked", True, None)
 
 
-NO_TEXT = {"address", "place", "name", "value", "sort", "path", "svg", "kept", "standing", "status", "tone", "kind"}
-"""Fields of pages that no reader sees as text."""
-
-
-def texts_of(value: Any) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif hasattr(value, "_fields"):
-        for name in value._fields:
-            if name == "options":
-                yield from (text for _, text in value.options)
-            elif name not in NO_TEXT:
-                yield from texts_of(getattr(value, name))
-    elif isinstance(value, (list, tuple)):
-        for item in value:
-            yield from texts_of(item)
-
-
 def test_every_text_of_every_page_is_a_message_or_of_the_records(
     looked: Looked, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As in documents: what stands in none of both could not be said in another language."""
-    from cmm_uq.app.serve import site
+    printed: list[object] = []
+    visible = application._visible
 
-    seen: list[WebPage] = []
-    render = site.render_page
-    monkeypatch.setattr(
-        site, "render_page", lambda page, foot, **how: [seen.append(page), render(page, foot, **how)][1]
-    )
-    for address in every_address(looked):
-        looked.get(address)
+    def kept(value: object) -> object:
+        printed.append(value)
+        return visible(value)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(application, "_visible", kept)
+        application._environment.cache_clear()
+        pages = [looked.text(address) for address in every_address(looked)]
+    application._environment.cache_clear()
     with open_records(looked.place, read_only=True) as records:
         known = "\n".join(part for entry in records.entries() for part in (entry.content, entry.hash)) + str(
             looked.place
         )
     known += f"{HOSTILE} {RESULTS} page x"
-    texts = [text for page in seen for text in texts_of(page)]
+    texts = [one for one in printed if isinstance(one, Text)]
     assert len(texts) > 500
     assert {text for text in texts if not said(text, known) and text not in known} == set()
+    spoken = {" ".join(str(visible(one)).split()) for one in printed if isinstance(one, Text | int)}
+    for page in pages:
+        shown = Shown(re.sub("<svg.*?</svg>", "", page, flags=re.DOTALL)).texts
+        assert {part for text in shown for part in text.split(" · ")} - spoken <= {"✓", "!", "✗"}
 
 
-def test_the_template_has_no_word_of_its_own() -> None:
-    from cmm_uq.certificate.look import template_folder
-
-    template = (template_folder() / "serve" / "page.html").read_text(encoding="utf-8")
-    bare = re.sub(r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}", "", template, flags=re.DOTALL)
+@pytest.mark.parametrize("path", sorted((template_folder() / "serve").rglob("*.html")), ids=lambda path: path.stem)
+def test_no_template_has_a_word_of_its_own(path: Path) -> None:
+    bare = re.sub(r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
     assert re.findall(r"[A-Za-z]{2,}", " ".join(Shown(bare).texts)) == []

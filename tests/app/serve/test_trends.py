@@ -10,8 +10,9 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, strategies as st
 
-from cmm_uq.app.serve.trends import BOTTOM, HEIGHT, RIGHT, TOP, WIDTH, Trend, drawn, new_years, ticks
-from cmm_uq.base.messages import say
+from cmm_uq.app.serve.application import _environment
+from cmm_uq.app.serve.trends import BOTTOM, HEIGHT, RIGHT, TOP, WIDTH, TrendPicture, new_years, ticks
+from cmm_uq.laboratory.records.listing import CourseValue
 
 DAY = dt.date(2020, 1, 1).toordinal()
 FINITE = st.floats(-1e6, 1e6, allow_nan=False)
@@ -24,14 +25,18 @@ def trend(
     adjusted: tuple[int, ...] = (),
     limit: float | None = None,
     u: float = 0.1,
-) -> Trend:
-    days = [DAY + 365 * i for i in range(len(values))]
-    return Trend(days, values, [v - u for v in values], [v + u for v in values], [False] * len(values), parted,
-                 adjusted, limit)  # fmt: skip
+) -> TrendPicture:
+    since = [dt.date.fromordinal(1 + sum(parted[:i])) for i in range(len(values))]
+    days = [dt.date.fromordinal(DAY + 365 * i) for i in range(len(values))]
+    stated = [
+        CourseValue(1, day, value, value - u, value + u, limit, False, adjustment)
+        for day, value, adjustment in zip(days, values, since, strict=True)
+    ]
+    return TrendPicture(stated, adjusted, limit)
 
 
-def picture(of: Trend) -> str:
-    return drawn(of, say("limit"), say("adjusted"))
+def picture(of: TrendPicture) -> str:
+    return str(_environment().get_template("trend.html").module.trend(of, "<b>"))
 
 
 def marks(svg: str) -> list[tuple[float, float]]:
@@ -91,7 +96,5 @@ def test_years_are_marked_where_they_begin() -> None:
     assert new_years(dt.date(2020, 2, 1).toordinal(), dt.date(2020, 12, 31).toordinal()) == []
 
 
-def test_words_in_a_picture_cannot_be_elements() -> None:
-    svg = drawn(trend([8.0], limit=8.0, adjusted=(DAY,)), say("<b>"), say("</svg>"))
-    assert "<b>" not in svg
-    assert "</svg>" not in svg
+def test_words_beside_a_picture_cannot_be_elements() -> None:
+    assert "<b>" not in picture(trend([8.0], limit=8.0, adjusted=(DAY,)))

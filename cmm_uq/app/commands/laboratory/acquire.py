@@ -285,8 +285,6 @@ def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Pa
     if job is None:
         name = re.sub(r"[^A-Za-z0-9._-]", "_", Path(what).name.removesuffix(library.ENDING))
         return DeclaredSource.model_construct(name=name or "instrument", profile=what, port=port), Path()
-    from cmm_uq.app.commands.reading import read_job
-
     read = read_job(job, recorded=False)
     sources = {source.name: source for source in read.facts.acquire.source}
     if what not in sources:

@@ -8,13 +8,13 @@ import getpass
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.files import REPORTS
+from cmm_uq.app.commands.files import REPORTS, opened
 from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.laboratory.due import due_in
 from cmm_uq.app.commands.reading import read_job
@@ -134,21 +134,6 @@ def write_ready(files: Mapping[str, str], folder: Path) -> list[Path]:
     return [folder / name for name in files]
 
 
-@contextlib.contextmanager
-def opened(place: str | Path | None, *, dry: bool) -> Iterator[Records | None]:
-    """The records, made where there are none; ``None`` where there are to be none, or a dry run would make them."""
-    if place is None or (dry and not is_url(place) and not Path(place).exists()):
-        yield None
-        return
-    from cmm_uq.laboratory.records.opening import open_records
-
-    with open_records(place, create=not dry, read_only=dry) as records:
-        if not dry:
-            with records.writing():
-                pass
-        yield records
-
-
 def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[notices.Notice]:
     """What is to be calibrated soon, or should have been."""
     if records is None or (latest := records.last_moment) is None or not (records.machines() or records.artefacts()):
@@ -216,9 +201,11 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
     log = Log(reports / facts.log.file if facts.log.file else None, facts.log.largest_bytes, facts.log.kept)
     ways = found.channels()
     try:
-        with opened(place, dry=asked.dry) as records:
-            if not asked.dry:
-                Problems(reports).mended(_RUN)
+        make = not asked.dry
+        with opened(place or NONE, None, make=make, create=make, read_only=asked.dry) as records:
+            if make:
+                with contextlib.nullcontext() if records is None else records.writing():
+                    Problems(reports).mended(_RUN)
             state = FolderState(reports) if records is None else RecordsState(records, reports)
             outbox = notices.Outbox(reports, ways, state, clock.moment)
             seed = facts.run.seed if asked.seed is None else asked.seed

@@ -13,21 +13,13 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.decision import PriorKnowledge
 from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
+from cmm_uq.analysis.parts import setup
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED, point_errors, variance_shares, ways
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.result import conforming, middle, stated, within_bounds
-from cmm_uq.analysis.parts.setup import (
-    PLACES,
-    circumstances_of,
-    doubled,
-    origin_of,
-    plan_of,
-    refuse_out_of_reach,
-    refuse_unfit,
-)
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual, prior_influence
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
 from cmm_uq.app.commands.parts.drift import further_of
@@ -87,22 +79,22 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     """The uncertainty of what is measured on a part, and whether it conforms; nothing is written."""
     options = options or PartOptions()
     seed = options.seed
-    refuse_unfit(job)
+    setup.refuse_unfit(job)
     of_part = measured_of(job)
     job, measured = of_part.job, of_part.values
-    plan = plan_of(job)
+    plan = setup.plan_of(job)
     trials = affordable(TRIALS, plan) if options.trials is None else options.trials
     methods = methods_of(job, plan, measured)
 
     # the machine: its certificate verified, its errors on the day of the measurement
     machine = state_machine(
         job, rerun=options.rerun, trust=options.trust, records=options.records, history=options.history, seed=seed,
-        stage=stage, fits=partial(refuse_out_of_reach, job),
+        stage=stage, fits=partial(setup.refuse_out_of_reach, job),
     )  # fmt: skip
     job = with_history(with_calibration(job, machine.job), machine.history)
 
     # the measurement made many times, with draws of every cause (JCGM 101)
-    circumstances = replace(circumstances_of(job, machine.state, plan, PLACES), measured=job.measured)
+    circumstances = replace(setup.circumstances_of(job, machine.state, plan, setup.PLACES), measured=job.measured)
     stage("Preparing the virtual measurements", 0.25)
     virtual = Virtual(plan, circumstances)
     either_side = never_negative(plan) & (job.reported is not None)
@@ -114,8 +106,8 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     stage("What would change the uncertainty", 0.7)
 
     def with_twice_the_points() -> tuple[Plan, MeasurementConditions]:
-        other = doubled(job)
-        return (twice := plan_of(other)), circumstances_of(other, machine.state, twice, PLACES)
+        other = setup.doubled(job)
+        return (twice := setup.plan_of(other)), setup.circumstances_of(other, machine.state, twice, setup.PLACES)
 
     draws = min(affordable(COMPARED, plan), trials)
     reductions = ways(plan, circumstances, draws, seed, doubled=with_twice_the_points, planned=virtual)
@@ -133,7 +125,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     characteristics = stated(simulated, measured, plan, errors, widths_alone=job.reported is not None)
     decisions = decide_limits(job, plan, errors, measured)
     together = None if measured is None else _together(conforming(plan, errors, measured)[1], decisions)
-    x, y, z = origin_of(job, machine.state.machine).tolist()
+    x, y, z = setup.origin_of(job, machine.state.machine).tolist()
     found = PartMeasurement(
         job, plan, circumstances, virtual, simulated, characteristics, measured, shares, unseen,
         further, decisions, together, tuple(reductions),
