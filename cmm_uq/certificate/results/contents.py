@@ -10,8 +10,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
-from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
-from cmm_uq.analysis.diagnosis.comparison.equivalence import AlternativeSet
+from cmm_uq.analysis.diagnosis.asserted import AlternativeSet, OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis
 from cmm_uq.analysis.diagnosis.empirical.model import EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.analysis.diagnosis.comparison.equivalence import AlternativeSet
+from cmm_uq.analysis.diagnosis.asserted import AlternativeSet
 from cmm_uq.analysis.diagnosis.diagnosis import ModelAverage, Rival
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm
 from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalFunction, EmpiricalModel, NamedForm

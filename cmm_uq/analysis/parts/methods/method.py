@@ -6,7 +6,7 @@ the calibrated part lay:
 
     U = k √(u_cal² + u_p² + u_b² + u_w²), k = 2, for results that are corrected by b; else |b| is added (ISO/TS 15530-3:2004).
 
-The budget itself is that of :func:`cmm_uq.maths.uncertainty.budgets.measurements.use_by_calibrated_workpiece`.
+The budget itself is that of :func:`cmm_uq.maths.uncertainty.budgets.machine.use_by_calibrated_workpiece`.
 
 By measuring it in several orientations: the method of ISO/DTS 15530-2, "Use of multiple workpiece orientations and calibrated
 simple standards", by its public summary: several orientations and repetitions, evaluated by analysis of variance; standards of

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.comparison.equivalence import AlternativeSet, alternative_sets
+from cmm_uq.analysis.diagnosis.asserted import AlternativeSet, alternative_sets
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search
 from cmm_uq.artefacts import artefact_facts
