@@ -27,11 +27,11 @@ from cmm_uq.jobs.tables.identification import Capability, Origin
 from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.artefact_doubt import growth
+from cmm_uq.machine.model.artefact_doubt import growth, taken_as_exact
 from cmm_uq.machine.physics.stated import physics_of
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.inference.linear_model import LeastSquares
-from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
+from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.type_a import Covariance, factor_of_noise
 
@@ -295,9 +295,17 @@ class Result:
         for effect in self.model.effects:
             if effect.name in tolerances:
                 name, quantity = next(iter(self.parameters[effect.name].items()))
+                exact = self._taken_as_exact((effect.name, name)) if effect.name not in self.free else ()
                 found.append(by_tolerance(f"{effect.name}.{name}", effect.title, quantity, tolerances[effect.name],
-                                          determined=effect.name not in self.free, against=against))  # fmt: skip
+                                          determined=effect.name not in self.free, against=[*against, *exact]))  # fmt: skip
         return Verdicts(found)
+
+    def _taken_as_exact(self, key: tuple[str, str]) -> list[Text]:
+        if not (self.artefact.exact or any(size.sd == 0 for size in self.artefact.sizes)):
+            return []
+        i = [unknown.key for unknown in self.posterior.unknowns].index(key)
+        weights = gain(self.estimate.linear, float(np.median(self.posterior.sigma)))[i]
+        return taken_as_exact(self.artefact, self.model.used, weights, float(self.values[:, i].std()))
 
     @cached_property
     def flagged(self) -> NDArray[np.bool_]:

@@ -301,7 +301,9 @@ def test_a_run_that_is_another_to_the_last_digit_is_told_and_repeats_at_the_same
 
 def test_references_of_which_no_uncertainty_is_stated_are_named() -> None:
     """A warning of the certificate names them; of positions the scale stays free, and nothing is taken as exact."""
-    named = [str(text) for text in AxisRuns(EXACT, joined(*six())).exact]
+    runs = AxisRuns(EXACT, joined(*six()))
+    named = [str(text) for text, _ in runs.exact]
+    assert not (runs.exact[0][1] & runs.exact[1][1]).any()
     assert named == ["The reference of straightnesses", "The reference of rotations"]
     stated = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0, u_straightness_um=0.0, u_rotation_arcsec=0.1)
     assert not AxisRuns(stated, joined(*six())).exact

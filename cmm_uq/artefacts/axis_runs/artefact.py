@@ -236,14 +236,14 @@ class AxisRuns(Artefact):
                 shape,
             )
 
-    def _taken_as_exact(self, edge: Any) -> Iterator[Text]:
+    def _taken_as_exact(self, edge: Any) -> Iterator[tuple[Text, NDArray[np.bool_]]]:
         """References of kinds of reading, each but a straightedge turned over, of which the job states no uncertainty."""
         for kind, stated, title in (
             (ACROSS, self._facts.u_straightness_um, say("The reference of straightnesses")),
             (TURNING, self._facts.u_rotation_arcsec, say("The reference of rotations")),
         ):
             if stated is None and any(run.kind == kind and not edge[run.rows].any() for run in self.runs):
-                yield title
+                yield title, self._kind == kind
 
     def _noise_scale(self) -> Floats:
         """As repeats show that the scatter of the kinds compares; else as readings are off their neighbours.

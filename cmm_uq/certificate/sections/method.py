@@ -211,7 +211,7 @@ def _noise(result: Result) -> list[Text]:
         texts.append(say("Only {degrees_of_freedom} degrees of freedom are left to estimate the noise from.",
                          degrees_of_freedom=freedom))  # fmt: skip
     exact = [size.title for size in result.artefact.sizes if size.certified and size.sd == 0]
-    exact += result.artefact.exact
+    exact += [title for title, _ in result.artefact.exact]
     return texts + [
         say("{title} is given without an uncertainty and is taken as exact.", title=title) for title in exact
     ]

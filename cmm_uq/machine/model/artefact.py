@@ -133,7 +133,8 @@ class Artefact(ABC):
     form: float = 0.0  # deviation of its own form by its certificate, mm; 0 where it is not stated
     # Sxy, Syz, Szx, rad, of axes on which its observations were found: where estimates begin
     leans: Floats = np.zeros(3)
-    exact: tuple[Text, ...] = ()  # what its readings go by, beside its sizes, of which nobody states an uncertainty
+    # what readings go by, beside its sizes, of which nobody states an uncertainty; with which observations (m,) do
+    exact: tuple[tuple[Text, NDArray[np.bool_]], ...] = ()
     key_of_u: ClassVar[str] = "u_um"  # of ``[artefact]``, that says how uncertain its lengths are
 
     @property

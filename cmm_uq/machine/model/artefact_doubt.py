@@ -19,10 +19,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cmm_uq.base.messages import say
+from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
-from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.units import MICROMETRE, PPM, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model.artefact import Artefact, Size
@@ -35,6 +36,7 @@ from cmm_uq.maths.inference.posterior import Cause
 
 CALIBRATION = say("calibration of the artefact")  # name of this cause
 _SAME_MM = 1e-6  # certified distances closer than this are of one place
+_NOTICED = 1e-3
 _LEAST_MM = 1e-12  # A standard uncertainty that is none
 
 
@@ -208,6 +210,20 @@ def growth(artefact: Artefact) -> Floats | None:
         return None
     nominal = np.array([artefact.sizes[i].nominal for i in dimensions])
     return np.asarray(artefact.size_change()[:, dimensions] @ nominal, dtype=np.float64)
+
+
+def taken_as_exact(artefact: Artefact, used: NDArray[np.bool_], weights: Floats, u: float) -> list[Text]:
+    """Of what an estimate rests on nobody states an uncertainty, in words.
+
+    used : which observations (m,) it is from. weights : (n,) by how much it changes with each of these, per mm.
+    u : its standard uncertainty. It rests on a length of which a ppm moves it by a thousandth of u, and on readings that have
+    a thousandth of the square of its weights.
+    """
+    found = [title for title, own in artefact.exact if np.sum(weights[own[used]] ** 2) > _NOTICED * (weights @ weights)]
+    along = growth(artefact)
+    if along is not None and abs(weights @ along[used]) * PPM > _NOTICED * u:
+        found += [size.title for size in artefact.sizes if size.role == "dimension" and size.sd == 0]
+    return [say("{title} is given without an uncertainty", title=title) for title in found]
 
 
 def longest_lengths(artefact: Artefact) -> Floats:

@@ -293,3 +293,18 @@ def test_a_calibration_that_did_not_hold_makes_no_pass_and_hides_nothing_worse(l
         "pass" if limit_um > 1 else "remeasure"
     )
     assert (found.outcome, lack in found.missing) == (outcome, True)
+
+
+def test_a_tolerance_on_what_rests_on_a_length_without_uncertainty_is_no_pass(iota: Path, tmp_path: Path) -> None:
+    """Scale of X is 79 ± 40 ppm, 80 ± 33 ppm with an exact length; a squareness comes from comparing bars with each other."""
+    shutil.copytree(iota, tmp_path / "job")
+    text = re.sub(r"(?m)^u_um = .*\n", "", (iota / "job.toml").read_text(encoding="utf-8"))
+    tolerances = "tolerances = { scale_x = 115.0, squareness_xy = 300.0 }"
+    text = re.sub(r"(?m)^effects = .*$", rf"\g<0>\n{tolerances}", text)
+    (tmp_path / "job" / "job.toml").write_text(text, encoding="utf-8")
+    found = {one.name: one for one in cmm_uq.report(tmp_path / "job").outcome.verdicts}
+    scale, squareness = found["scale_x.ppm"], found["squareness_xy.angle_arcsec"]
+    assert (scale.outcome, list(map(str, scale.missing))) == (
+        "undecided", ["Length of the bar is given without an uncertainty"],
+    )  # fmt: skip
+    assert (squareness.outcome, squareness.missing) == ("pass", ())
