@@ -36,6 +36,7 @@ _FORMULA = re.compile(r"(?<=\S)\s*[=＝].*", re.DOTALL)  # that says how a colum
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
+_POWER = 99  # of ten, beyond which a text is no figure
 WORD = re.compile(r"[^\W\d_]+")
 
 
@@ -54,7 +55,9 @@ def figure(cell: Cell, sign: str) -> tuple[float, float] | None:
     if not _PLAIN.fullmatch(text):
         return None
     mantissa, _, power = text.lower().partition("e")
-    return float(text), 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
+    if abs(int(power[:5] or 0)) > _POWER or not np.isfinite(value := float(text)):
+        return None
+    return value, 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
 
 
 def sign_of(rows: Sequence[Sequence[Cell]]) -> str:

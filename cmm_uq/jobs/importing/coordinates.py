@@ -100,10 +100,22 @@ def _bare(grid: CutSheet, columns: Sequence[FigureColumn], rows: Sequence[int]) 
 def _nominal_of(columns: Sequence[FigureColumn]) -> set[int]:
     """Nominal values and deviations beside measured ones, which are their sum."""
     found: set[int] = set()
-    for nominal, measured, d in permutations(columns, 3):
-        words = d.role in (None, DEVIATION) and measured.role not in (NOMINAL, REFERENCE) and nominal.role != MEASURED
-        if words and np.any(d.values) and any(agrees(d, measured, nominal, f) for f in factors(d, nominal)):
-            found |= {nominal.i, d.i}
+    values, fine = np.array([c.values for c in columns]), np.array([c.step for c in columns])
+    slack = np.add.outer(fine, fine) + 1e-6
+    for d in columns:
+        if d.role not in (None, DEVIATION) or not np.any(d.values) or not np.isfinite(d.values).any():
+            continue
+        at = int(
+            np.nanargmax(np.abs(d.values))
+        )  # of all sums that may be so few hold in this row, whatever the others say
+        apart = np.subtract.outer(values[:, at], values[:, at])
+        for f in dict.fromkeys(f for c in columns for f in factors(d, c)):
+            for i, k in np.argwhere(~(np.abs(apart - d.values[at] * f) > d.step * f + slack)):
+                measured, nominal = columns[i], columns[k]
+                words = measured.role not in (NOMINAL, REFERENCE) and nominal.role != MEASURED
+                other = d is not measured and d is not nominal and measured is not nominal
+                if other and words and not {nominal.i, d.i} <= found and f in factors(d, nominal):
+                    found |= {nominal.i, d.i} if agrees(d, measured, nominal, f) else set()
     return found
 
 

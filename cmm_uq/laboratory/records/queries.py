@@ -9,6 +9,7 @@ import os
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,18 +70,10 @@ class RecordQueries:
     def artefacts(self, on: dt.date | None = None) -> list[facts.ArtefactRow]:
         """All artefacts, by serial, with the newest certificate that is stated up to a day."""
         with self.reading() as connection:
-            rows = _known_on(connection, artefacts, ("certificate", "laboratory", "calibrated", "due"), on)
-        of = facts.ArtefactRow
+            rows = _known_on(connection, artefacts, _ARTEFACT[2:], on)
         return [
-            of(
-                r["called"],
-                r["kind"],
-                r["certificate"] or "",
-                r["laboratory"] or "",
-                _day(r["calibrated"]),
-                _day(r["due"]),
-            )
-            for r in rows
+            facts.ArtefactRow(called, kind, certificate or "", laboratory or "", _day(calibrated), _day(due))
+            for called, kind, certificate, laboratory, calibrated, due in map(itemgetter(*_ARTEFACT), rows)
         ]
 
     def certificates(
@@ -257,7 +250,7 @@ def blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
     return (numbers[i : i + _TOGETHER] for i in range(0, len(numbers), _TOGETHER))
 
 
-_RULE = ("calibrate",)
+_RULE, _ARTEFACT = ("calibrate",), ("called", "kind", "certificate", "laboratory", "calibrated", "due")
 
 
 def _known_on(
