@@ -32,7 +32,7 @@ from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, studentised
 from cmm_uq.maths.inference.noise import Components
-from cmm_uq.maths.inference.posterior import Density, NoisyPosterior
+from cmm_uq.maths.inference.posterior import Density, NoisyPosterior, symmetric_root
 from cmm_uq.maths.uncertainty.quantity import Quantity, mixed
 
 REMAINS = 0.01  # probability from which a combination of explanations remains
@@ -159,13 +159,9 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
         degrees = max(reduced.count - fitted, 1.0) + known
         sigma = max(float(np.sqrt((left @ left + known * (stated or 0.0) ** 2) / degrees)), 1e-6)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(17,)))
-    scale = np.sqrt(np.diag(covariance))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    # The symmetric root: axes of equal length turn with the last digits, their sum does not.
-    root = scale[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
     normal = random.standard_normal((_DRAWS, len(mean)))
     wider = np.sqrt(degrees / random.chisquare(degrees, _DRAWS))
-    return np.asarray(mean + wider[:, None] * (normal @ root.T))
+    return np.asarray(mean + wider[:, None] * (normal @ symmetric_root(covariance).T))
 
 
 def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quantity]]:

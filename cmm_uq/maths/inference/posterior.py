@@ -280,14 +280,8 @@ class Doubt:
     def widened(self, draws: Floats, seed: int) -> Floats:
         """Draws (N, k) with what is in doubt, about the same mean."""
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(23,)))
-        covariance = self.covariance()
-        scale = np.sqrt(np.diag(covariance))
-        scale = np.where(scale > 0, scale, 1.0)
-        values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-        # The symmetric root: axes of equal length turn with the last digits, their sum does not.
-        root = scale[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
         normal = random.standard_normal(draws.shape)
-        return np.asarray(draws + (normal - normal.mean(axis=0)) @ root.T)
+        return np.asarray(draws + (normal - normal.mean(axis=0)) @ symmetric_root(self.covariance()).T)
 
     def larger(self, quantity: Quantity, combination: Floats) -> Quantity:
         """A combination (k,) of widened draws, its variance not below what is in doubt of it by itself."""
@@ -297,6 +291,14 @@ class Doubt:
         wider = float(np.sqrt(1 + more / quantity.u**2))
         low, high = (quantity.value + wider * (end - quantity.value) for end in quantity.interval95)
         return replace(quantity, u=wider * quantity.u, interval95=(low, high))
+
+
+def symmetric_root(covariance: Floats) -> Floats:
+    """(k, k) of a covariance, in units of its deviations: axes of one length turn with the last digits, their sum does not."""
+    scale = np.sqrt(np.diag(covariance))
+    scale = np.where(scale > 0, scale, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * ((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T))
 
 
 def gain(linear: LinearModel, sigma: float) -> Floats:
