@@ -165,16 +165,9 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
 
 
 def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quantity]]:
-    found, column = {}, 0
-    for effect in model.effects:
-        own = draws[:, column : column + len(effect.coefficients)]
-        column += len(effect.coefficients)
-        shape = np.tile(np.array(model.shapes.get(effect.name, ()), dtype=np.float64), (len(own), 1))
-        units = {parameter.name: parameter.unit for parameter in effect.reported}
-        # what shapes an effect is held here: neither it nor a phase, which goes with it, is estimated
-        held = {shaped.name for shaped in effect.shape} | ({"phase_rad"} if effect.shape else set())
-        each = {name: values for name, values in effect.to_reported(own, shape).items() if name not in held}
-        found[effect.name] = {name: Quantity.of_draws(values, units[name]) for name, values in each.items()}
+    found: dict[str, dict[str, Quantity]] = {effect.name: {} for effect in model.effects}
+    for (owner, name), drawn in model.reported(draws, found).items():
+        found[owner][name] = Quantity.of_draws(*drawn)
     return found
 
 

@@ -102,18 +102,20 @@ class RecordingModel:
     ) -> dict[tuple[str, str], tuple[Floats, Unit]]:
         """Draws (N,), and unit, of every parameter as it is reported, then of the artefact's sizes, by key.
 
-        ``draws``: (N, k) of the unknowns. ``owners``: effects that are asked for; by default all, none of which may have a
-        shape, and the artefact.
+        ``draws``: (N, k) of the unknowns. ``owners``: effects that are asked for; by default all, and the artefact. What
+        shapes an effect is held: neither it nor a phase, which goes with it, is reported.
         """
-        found, column = {}, 0
+        found, column = dict[tuple[str, str], tuple[Floats, Unit]](), 0
         for effect in self.effects:
             own = draws[:, column : column + len(effect.coefficients)]
             column += len(effect.coefficients)
             if owners is not None and effect.name not in owners:
                 continue
+            shape = np.tile(np.array(self.shapes.get(effect.name, ()), dtype=np.float64), (len(own), 1))
             units = {parameter.name: parameter.unit for parameter in effect.reported}
-            for name, values in effect.to_reported(own, np.zeros((len(own), 0))).items():
-                found[effect.name, name] = values, units[name]
+            held = {shaped.name for shaped in effect.shape} | ({"phase_rad"} if effect.shape else set())
+            each = effect.to_reported(own, shape).items()
+            found |= {(effect.name, name): (values, units[name]) for name, values in each if name not in held}
         sizes = self.artefact.sizes if owners is None or ARTEFACT in owners else ()
         for size, values in zip(sizes, draws[:, column : column + len(sizes)].T, strict=True):
             found[ARTEFACT, size.name] = values, size.unit
