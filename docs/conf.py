@@ -44,7 +44,7 @@ CONTENTS: dict[str, list[str]] = {
         "validation", "validation-parts", "parts-study", "coverage-study", "noise-ranks", "diagnosis-studies",
         "mutation-study",
         "hostile-study", "tampering-study", "records/drift-study", "uncertainty/validation",
-        "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks",
+        "machine/harris-2004", "machine/benchmarks", "uncertainty/benchmarks", "waiting",
         "peers", "sources", "uncertainty/harris-2004",
     ],
     "The project": ["/README", "/CHANGELOG", "/CONTRIBUTING", "layout"],

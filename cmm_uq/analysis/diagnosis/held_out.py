@@ -251,6 +251,8 @@ def _read_again(model: RecordingModel) -> Ints:
     artefact, rows = model.artefact, model.artefact.rows[model.used]
     places = artefact.points.machine_xyz[rows].reshape(len(rows), -1)
     others = np.column_stack([artefact.measurement, number_in_reading(model)])[model.used]
+    if len(np.unique(others, axis=0)) == len(others):  # as most recordings are: no tree need be looked up
+        return np.arange(len(others))
     tree = scipy.spatial.cKDTree(np.column_stack([places, 1e9 * others]))  # further apart than any places
     near = tree.query_pairs(SAME_PLACE, output_type="ndarray")
     graph = scipy.sparse.coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(rows), len(rows)))

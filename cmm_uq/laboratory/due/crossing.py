@@ -23,10 +23,12 @@ from cmm_uq.laboratory.due.drift_filter import DriftState
 from cmm_uq.laboratory.due.steps import FollowedHistory, followed
 from cmm_uq.laboratory.records.facts import Series
 
+_HORIZON = drift.HORIZON * drift.YEAR
+
 
 def grid(gaps: int) -> Floats:
     """Days after the last certificate, (gaps + 1,): none, a week, and as many times further each up to the horizon."""
-    return np.concatenate([[0.0], np.geomspace(7.0, drift.HORIZON * drift.YEAR, gaps)])
+    return np.concatenate([[0.0], np.geomspace(7.0, _HORIZON, gaps)])
 
 
 DAYS, FINE = grid(48), grid(160)  # A sixth further each, for many machines whose dates are wide; a twentieth, for one
@@ -112,7 +114,12 @@ class Crossing:
 
 
 def crossing(
-    series: Series | drift.DriftHistory, limit: float, prior: drift.DriftPrior | None = None, *, one_sided: bool = False
+    series: Series | drift.DriftHistory,
+    limit: float,
+    prior: drift.DriftPrior | None = None,
+    *,
+    one_sided: bool = False,
+    until: float = _HORIZON,
 ) -> Crossing:
     """When one machine's error will first be beyond its limit.
 
@@ -122,6 +129,7 @@ def crossing(
     limit : the error conforms while |error| ≤ limit, or error ≤ limit.
     prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_model.FleetPrior.prior`), or none.
     one_sided : only what is above the limit is beyond it.
+    until : days after the last certificate that are looked at.
 
     Raises
     ------
@@ -130,12 +138,12 @@ def crossing(
     if not (np.isfinite(limit) and limit > 0):
         raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
     known = series if isinstance(series, drift.DriftHistory) else drift.history(series)
-    return crossing_of(followed(known, limit, prior), limit, one_sided=one_sided)
+    return crossing_of(followed(known, limit, prior), limit, one_sided=one_sided, until=until)
 
 
-def crossing_of(known: FollowedHistory, limit: float, *, one_sided: bool = False) -> Crossing:
+def crossing_of(known: FollowedHistory, limit: float, *, one_sided: bool = False, until: float = _HORIZON) -> Crossing:
     """The same of a history that was followed already."""
-    many = crossings(known.machines, known.prior, known.state, limit, one_sided=one_sided, days=FINE)
+    many = crossings(known.machines, known.prior, known.state, limit, one_sided=one_sided, until=until, days=FINE)
     return many.one(0)
 
 
@@ -152,7 +160,7 @@ class _States(NamedTuple):
 
 def crossings(
     machines: drift.Histories, prior: drift.DriftPrior, state: DriftState, limit: Floats | float, *, one_sided: bool = False,
-    paths: int = PATHS, until: float = drift.HORIZON * drift.YEAR, days: Floats = DAYS,
+    paths: int = PATHS, until: float = _HORIZON, days: Floats = DAYS,
 ) -> Crossings:  # fmt: skip
     """When the errors of many machines will be; later than ``until`` days, probabilities are those of that day."""
     N, M = len(machines), state.log_weight.shape[2]

@@ -30,7 +30,7 @@ from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.laboratory.due import rule as rules
 from cmm_uq.laboratory.due.crossing import crossing
-from cmm_uq.laboratory.due.drift import DriftPrior
+from cmm_uq.laboratory.due.drift import HORIZON, YEAR, DriftPrior
 from cmm_uq.laboratory.due.reliability import grouped, reliability_regression
 from cmm_uq.laboratory.due.rule import USUAL, IntervalBounds, Pool, Rule, calibrations, months_of
 from cmm_uq.laboratory.records.facts import RecordedCertificate, Series
@@ -246,11 +246,13 @@ def drift_interval(
     limited = [(one, one.limit) for one in stated if one.limit]
     if not limited:
         raise CmmUqError(say("its certificate has no limits"))
+    limited.sort(key=lambda each: -abs(each[0].value[-1]) / each[1])  # how soon the first crosses says how far to look
     found: list[tuple[float, str, bool]] = []
     refused: CmmUqError | None = None
     for one, limit in limited:
+        soonest = min(found, default=(HORIZON * YEAR,))[0]
         try:
-            crossed = crossing(one, limit, priors.get(one.name)).quantile(1 - reliability)
+            crossed = crossing(one, limit, priors.get(one.name), until=soonest + 1).quantile(1 - reliability)
         except CmmUqError as error:
             refused = error
             continue

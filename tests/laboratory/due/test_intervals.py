@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,17 +16,21 @@ from hypothesis import given, settings, strategies as st
 from scipy.stats import beta, binomtest, norm, t
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.due.crossing import crossing
 from cmm_uq.laboratory.due.intervals import (
     DriftPolynomial,
     LastValue,
+    drift_interval,
     fitted_drift,
     interval_of_reliability,
     interval_test,
     reliability_range,
+    series_from,
     staircase,
     steps,
 )
 from cmm_uq.laboratory.due.rule import IntervalBounds
+from tests.laboratory.records.histories import made
 
 PRINTED = [
     ((15, 20, 365, 0.95), 0.5, (231, 0.9949, 0.6516, 0.8286)),
@@ -206,3 +211,17 @@ def test_a_known_drift_by_hand() -> None:
 def test_one_interval_is_too_few() -> None:
     with pytest.raises(CmmUqError, match="more than 1 intervals"):
         fitted_drift(DAYS[:1], CHANGES[:1])
+
+
+def test_the_drift_s_interval_is_that_of_the_value_that_crosses_first(tmp_path: Path) -> None:
+    """Values that are looked at only as far as another crosses say the same as all of them looked at to the horizon."""
+    with made(tmp_path / "records.db", 6, 4) as records:
+        for machine in records.machines():
+            certificates = records.certificates(machine.serial)
+            last = certificates[-1]
+            days = [
+                (float("inf") if at is None else (at - last.day).days, one.quantity, False)
+                for one in (series_from(certificates, value.name) for value in last.values)
+                for at in (crossing(one, one.limit or 0.0).quantile(0.05),)
+            ]
+            assert drift_interval(certificates, 0.95, {}) == min(days)
