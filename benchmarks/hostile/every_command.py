@@ -62,7 +62,8 @@ SET = tuple(f"{MADE}/{name}" for name in ("certificate", "results.json", "proven
 LINES = (
     Line("new ballbar new --from @iota/ballbar.csv --machine M --set job.date=2026-05-31", ("iota/ballbar.csv",)),
     Line("new part new --set part.name=P"),
-    Line("import @iota/ballbar.csv", ("iota/ballbar.csv",)), Line("check @mount", JOB), Line("check @part", ("part/",)),
+    Line("import @iota/ballbar.csv", ("iota/ballbar.csv",)), Line("import @exports/plate.txt", ("exports/plate.txt",)),
+    Line("import @exports/bar.txt", ("exports/bar.txt",)), Line("check @mount", JOB), Line("check @part", ("part/",)),
     Line("report @mount --out out --records none", JOB), Line("report @iota --out out --records none", ("iota/",)),
     Line("report @mount --out out --records @reports/records.db", (RECORDS,)),
     Line("report @mount --out out --records none --sign @key.p12", ("key.p12",)),
@@ -193,6 +194,12 @@ def _made() -> Mapping[str, bytes]:
             if path.is_file()
         }
     made |= {f"iota/{name}": content for name, content in seeds()["compensable"].files.items()}
+    exports = Path(__file__).parents[2] / "tests" / "jobs" / "importing"  # of other programs
+    for name, source in (
+        ("plate", "development_exports/D05_PCDMIS_ballplate"),
+        ("bar", "further_exports/S16_BALLBAR_VERIFICATION"),
+    ):
+        made[f"exports/{name}.txt"] = (exports / f"{source}.txt").read_bytes()
     made |= {name.replace("iota/", "own/", 1): content for name, content in made.items() if name.startswith("iota/")}
     made["own/job.toml"] += OWN_PHYSICS
     rows = b"".join(b"%d,%d,%d,%d,-%d\n" % (i, -i, 100 + i, 150 + 2 * i, 200 + i) for i in range(30))
