@@ -67,9 +67,9 @@ def main() -> None:
 
 
 def _records(path: Path) -> list[dict[str, Any]]:
-    """Those that are kept, by number; the last line of a study that was killed is none."""
+    """Those that are kept, by number; the last line of a study that was killed is none, and U+2028 ends no line."""
     found = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+    for line in path.read_text(encoding="utf-8").split("\n") if path.exists() else ():
         with contextlib.suppress(ValueError):
             record = json.loads(line)
             found[record["number"]] = record
