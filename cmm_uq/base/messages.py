@@ -194,6 +194,11 @@ def after(text: Text, further: Text) -> Text:
     return sentences(part for part in (text, further) if part)
 
 
+def holding(*texts: tuple[object, Text]) -> list[Text]:
+    """Those texts beside which something true stands."""
+    return [text for true, text in texts if true]
+
+
 def at_key(name: str) -> Key:
     """A key behind what it states, in brackets."""
     return Key(f" ({name})")

@@ -8,7 +8,7 @@ from typing import Any
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed, without_keys
 from cmm_uq.base.units import unit
-from cmm_uq.certificate import clauses, origin as origins
+from cmm_uq.certificate import clauses, document, origin as origins
 from cmm_uq.certificate.clauses import claimed, traceability
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
@@ -16,9 +16,14 @@ from cmm_uq.certificate.result import Outcome, Page, Result, StatedUncertainty
 from cmm_uq.certificate.results.contents import results
 from cmm_uq.certificate.results.provenance import COMPARED, NOT_COMPARED, REBUILT
 from cmm_uq.certificate.sections import results as of_result
-from cmm_uq.certificate.sections.conformity import conformity_section
+from cmm_uq.certificate.sections.conformity import (
+    conformity_section,
+    machine_alone,
+    own_figures,
+    performance,
+    with_performance,
+)
 from cmm_uq.certificate.sections.method import method, posterior_section, warnings
-from cmm_uq.certificate.sections.performance import machine_alone, own_figures, performance, with_performance
 from cmm_uq.certificate.sections.regions import regions_section, with_regions
 from cmm_uq.certificate.wording import TEMPERATURES
 from cmm_uq.jobs.job import Job
@@ -35,9 +40,9 @@ def conditions(job: Job) -> Facts:
             high=signed(float(columns[name].max()), ".2f"), unit=unit("°C"))
         for name, what in TEMPERATURES.items() if name in columns
     )  # fmt: skip
-    stated = Verbatim(job.facts.job.conditions)
-    rows = ((say("Conditions"), stated), (say("Temperatures recorded"), recorded))
-    return Facts(tuple(row for row in rows if row[1]))
+    return document.facts(
+        (say("Conditions"), Verbatim(job.facts.job.conditions)), (say("Temperatures recorded"), recorded)
+    )
 
 
 Row = tuple[Text, str]  # what a particular is, and what the job states of it; empty where it states nothing
@@ -116,10 +121,14 @@ def identified(
     job: Identification, laboratory: Laboratory, origin: str, numbered: Text = CERTIFICATE_NUMBER
 ) -> tuple[Row, ...]:
     """Number, by what it is called, customer, order and dates of any certificate or report."""
-    measured = origin == MEASURED
+    measured, of = origin == MEASURED, job.replaces
+    replaced: tuple[Row, ...] = () if of is None else (  # why, and what changed (7.8.8)
+        (say("Replaces certificate"), clauses.replaced_certificate(of)), (say("Reason for the replacement"), of.reason),
+        (say("Changed against it"), of.changed), (COMPARED, NOT_COMPARED),
+    )  # fmt: skip
     return (
         (numbered if measured else say("Job"), job.number if measured and job.number else job.id),
-        *(_replacement(job) if measured else ()),
+        *(replaced if measured else ()),
         (say("Customer"), "\n".join(filter(None, (job.customer, job.address)))),
         (say("Order"), job.order),
         (say("Accreditation"), laboratory.accreditation if measured else ""),
@@ -131,26 +140,10 @@ def identified(
 
 def performed(job: Identification) -> tuple[Row, ...]:
     return (
-        (say("Method"), job.procedure),
-        (say("Deviations from the method"), job.deviations),
-        (say("Results of external providers"), job.external),
-        (say("Data from the customer"), job.from_customer),
-        (say("Operator"), job.operator),
-        (say("Remarks"), job.remarks),
-    )
-
-
-def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
-    """Which certificate this one replaces, why, and what changed (7.8.8)."""
-    replaced = job.replaces
-    if replaced is None:
-        return ()
-    return (
-        (say("Replaces certificate"), clauses.replaced_certificate(replaced)),
-        (say("Reason for the replacement"), replaced.reason),
-        (say("Changed against it"), replaced.changed),
-        (COMPARED, NOT_COMPARED),
-    )
+        (say("Method"), job.procedure), (say("Deviations from the method"), job.deviations),
+        (say("Results of external providers"), job.external), (say("Data from the customer"), job.from_customer),
+        (say("Operator"), job.operator), (say("Remarks"), job.remarks),
+    )  # fmt: skip
 
 
 def with_capability(result: Result) -> tuple[Result, StatedUncertainty]:

@@ -367,8 +367,9 @@ def contradictions(job: Job) -> tuple[Text, ...]:
     """Dates out of their order, and an artefact that was certified on the machine which it tests."""
     circular = say(
         "The artefact was certified on the machine that it now tests{key}: errors that both "
-        "measurements have in common are not seen here.", key=messages.at_key("[artefact.certificate] machine"),
-    )  # fmt: skip
+        "measurements have in common are not seen here.",
+        key=messages.at_key("[artefact.certificate] machine"),
+    )
     return (*((circular,) if certified_on_this_machine(job.facts) else ()), *dates_out_of_order(job))
 
 

@@ -71,6 +71,11 @@ class Facts:
     kind: ClassVar[str] = "facts"
 
 
+def facts(*rows: tuple[Text, Text]) -> Facts:
+    """Without those that have no value."""
+    return Facts(tuple(row for row in rows if row[1]))
+
+
 @dataclass(frozen=True)
 class Column:
     """Heading of a table column; numeric columns are aligned to the right with tabular figures."""

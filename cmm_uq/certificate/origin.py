@@ -59,20 +59,14 @@ def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text])
     warnings = (*told, *document.warnings)
     if origin == MEASURED:
         return replace(document, warnings=warnings)
-    is_certificate = document.title == CERTIFICATE
-    return replace(
-        document,
-        title=TITLES[origin] if is_certificate
-        else say("{title} of a simulated recording", title=document.title) if origin == SIMULATED
-        else say("{title} of a compensated recording", title=document.title),
-        number=Verbatim(id),
-        banner=BANNERS[origin],
-        draft=False,
-        warnings=warnings,
-        statements=(),
-        signatures=(),
-        end=say("End of evaluation") if is_certificate else document.end,
-    )  # fmt: skip
+    title: Text = TITLES[origin]
+    end: Text = say("End of evaluation")
+    if document.title != CERTIFICATE:
+        simulated = say("{title} of a simulated recording", title=document.title)
+        compensated = say("{title} of a compensated recording", title=document.title)
+        title, end = simulated if origin == SIMULATED else compensated, document.end
+    return replace(document, title=title, number=Verbatim(id), banner=BANNERS[origin], draft=False, warnings=warnings,
+                   statements=(), signatures=(), end=end)  # fmt: skip
 
 
 DIGITAL = "certificate.xml"  # the digital certificate
@@ -108,12 +102,8 @@ def made_after(head: ChainHead | None) -> Text:
     if head.at is None:
         return say("Records of the laboratory before this document: empty, entry 0.")
     at, digest = Verbatim(head.at[:19].replace("T", " ")), Verbatim(head.head)
-    return say(
-        "Records of the laboratory before this document: entry {number} of {at} UTC, SHA-256 {digest}.",
-        number=head.entries,
-        at=at,
-        digest=digest,
-    )
+    return say("Records of the laboratory before this document: entry {number} of {at} UTC, SHA-256 {digest}.",
+               number=head.entries, at=at, digest=digest)  # fmt: skip
 
 
 NAME = "cmm-uq"
@@ -157,6 +147,17 @@ def _rounded(value: Any) -> Any:
     return float(f"{value:.10g}") if isinstance(value, float) else value
 
 
+def attributes(of: object, *names: str) -> dict[str, Any]:
+    """What stands under its own name in results.json; a sequence as a list."""
+    values = ((name, getattr(of, name)) for name in names)
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values}
+
+
+def rows(**columns: Iterable[object]) -> list[dict[str, Any]]:
+    """Columns of a table as its rows."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
 def quantity_data(quantity: Quantity) -> dict[str, Any]:
     """Value, standard uncertainty, 95 % interval, expanded uncertainty, coverage factor; its unit is in the key above it."""
     return {
@@ -171,8 +172,6 @@ MOST_NUMBERS = 2**16
 
 @dataclass(frozen=True)
 class PosteriorFile:
-    """The file, and what results.json says of it."""
-
     name: str
     content: bytes
     entry: dict[str, Any]
@@ -214,8 +213,6 @@ class FurtherCertificate:
 
 @dataclass(frozen=True)
 class FurtherCertificates:
-    """All of them, and what the reader must know."""
-
     each: tuple[FurtherCertificate, ...] = ()
     warnings: tuple[Text, ...] = ()
 
@@ -227,11 +224,8 @@ class FurtherCertificates:
     def together(self) -> Text:
         """Which of them are taken together with the recording of the calibration, in a sentence."""
         numbers = listed(names(one.number for one in self.used))
-        return (
-            say("The recordings of {certificates} are taken together with it.", certificates=numbers)
-            if numbers
-            else NOTHING
-        )
+        told = say("The recordings of {certificates} are taken together with it.", certificates=numbers)
+        return told if numbers else NOTHING
 
 
 NO_FURTHER = FurtherCertificates()

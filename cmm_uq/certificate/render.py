@@ -237,15 +237,11 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     """
     language = code_of(document.language)
     content = {
-        "document": fitted(document).as_data(),
-        "smallest": SMALLEST,
-        "words": doc.view_words(language),
-        "colour": COLOURS,
-        "date": document.date.isoformat() if document.date else EPOCH,
+        "document": fitted(document).as_data(), "smallest": SMALLEST, "words": doc.view_words(language),
+        "colour": COLOURS, "date": document.date.isoformat() if document.date else EPOCH,
         "attachments": [_attachment(name, data, language) for name, data in attachments.items()],
-        "logo": document.logo and {"format": document.logo.format, "data": list(document.logo.content)},
-        "missing": "",
-    }
+        "logo": document.logo and {"format": document.logo.format, "data": list(document.logo.content)}, "missing": "",
+    }  # fmt: skip
     return _with_fallback(content, language)
 
 
@@ -301,12 +297,9 @@ def _compile(
     return typst.compile(
         (template_folder() / template).read_bytes(),
         font_paths=typst.Fonts(include_system_fonts=system_fonts, font_paths=folders),
-        ignore_system_fonts=not system_fonts,
-        sys_inputs={"input": json.dumps(content)},
-        pdf_standards=list(standards),
-        pdf_tags=tagged,
-        timestamp=0,
-    )
+        ignore_system_fonts=not system_fonts, sys_inputs={"input": json.dumps(content)}, pdf_standards=list(standards),
+        pdf_tags=tagged, timestamp=0,
+    )  # fmt: skip
 
 
 def _without(content: dict[str, Any], missing: list[str]) -> dict[str, Any]:

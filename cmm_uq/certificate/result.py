@@ -200,7 +200,6 @@ class Result:
         return as_evaluated if self.stating is None else self.stating.raised_to
 
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
-        """Every quantity that is reported, with its name."""
         for effect, values in self.parameters.items():
             yield from ((f"{effect} {name}", quantity) for name, quantity in values.items())
         yield from self.sizes.items()

@@ -178,8 +178,6 @@ class Headline:
 
 @dataclass(frozen=True)
 class Summary:
-    """An outcome for the end of a command."""
-
     subject: Text = NOTHING  # what was measured
     date: Text = NOTHING
     verdicts: tuple[Headline, ...] = ()  # what it comes to

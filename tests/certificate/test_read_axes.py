@@ -7,7 +7,7 @@ import pytest
 
 from cmm_uq.analysis.machine.state import StatementEvidence
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.sections.read_axes import (
+from cmm_uq.certificate.sections.regions import (
     readings_data,
     readings_table,
     readings_warnings,

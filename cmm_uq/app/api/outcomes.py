@@ -25,7 +25,7 @@ from cmm_uq.certificate.part.figures import part_summary
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Outcome, Result
-from cmm_uq.certificate.sections.performance import ranking_plot
+from cmm_uq.certificate.sections.conformity import ranking_plot
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.place import NONE

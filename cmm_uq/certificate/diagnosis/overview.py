@@ -11,36 +11,15 @@ from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
 from cmm_uq.analysis.planning.set_up import odds_words
 from cmm_uq.analysis.screening.columns import Finding
-from cmm_uq.base.messages import (
-    NOTHING,
-    Text,
-    Verbatim,
-    after,
-    alternatives,
-    commas,
-    day,
-    lines,
-    listed,
-    say,
-    semicolons,
-)
-from cmm_uq.certificate.diagnosis.empirical import (
-    AGAINST_SIMULATION,
-    TITLE,
-    contained,
-    empirical_words,
-    mistaken,
-    nearest_words,
-    repeats_words,
-    to_mend,
-)
+from cmm_uq.base import messages
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, holding, lines, listed, say, semicolons
+from cmm_uq.certificate.diagnosis import empirical
 from cmm_uq.certificate.diagnosis.sections import by_columns, explanation, next_sentence, place_words, without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.wording import Headline, Summary, effect_of, effect_title, probability, size_of, titles
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.verdicts import DIAGNOSES
-from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # What a verdict means for who is to act
@@ -92,14 +71,14 @@ def overview_of(result: JobDiagnosis) -> Overview:
     )  # fmt: skip
     title, standing = VERDICT_TITLES[d.verdict], STANDING[d.verdict]
     if result.mistakes.asserted:
-        title, standing = TITLE, "open"
+        title, standing = empirical.TITLE, "open"
     elif without_power(result):
         title, standing = say("Consistent, as far as this recording can show"), "open"
     elif d.verdict == "explained" and (
         _otherwise(d) or any(instead(d, item) or item.alternatives for item in d.effects)
     ):
         title = say("Explained: more than one cause is possible")
-    if said := mistaken(result.mistakes):
+    if said := empirical.mistaken(result.mistakes):
         rows = ((rows[0][0], lines(filter(None, (said, rows[0][1])))), *rows[1:])
     return Overview(title, standing, tuple(row for row in rows if row[1]))
 
@@ -107,39 +86,30 @@ def overview_of(result: JobDiagnosis) -> Overview:
 def _found(result: JobDiagnosis) -> Text:
     d = result.diagnosis
     if d.verdict == "undetermined":
-        return lines((say("Nothing that stands out of noise of the set-ups."), repeats_words(d)))
+        return lines((say("Nothing that stands out of noise of the set-ups."), empirical.repeats_words(d)))
     if d.verdict == "consistent":
         if result.simulated is None:
             return say("Nothing beyond the effects that the job names: what they leave is noise.")
         return say("Nothing beyond the simulation: what it leaves is noise.")
-    if not d.effects and result.mistakes.named:
-        return NOTHING
     if not d.effects:
-        beyond = empirical_words(d) or [say("A misfit that no known effect accounts for.")]
+        if result.mistakes.named:
+            return NOTHING
+        beyond = empirical.empirical_words(d) or [say("A misfit that no known effect accounts for.")]
         return lines((*beyond, *withheld_words(d.withheld)))
     texts: list[Text] = []
     for item in d.effects:
         size = size_of(effect_of(item.effect, d.after.effects), item.parameters, factors=False)
         told = say("{title}: {size}.", title=item.title, size=size)
-        if others := others_of(d, item):
-            told = say("{told} {others}", told=told, others=_as_well(others))
-        texts.append(after(told, contained(result.simulated, item.effect)))
+        single = (say("{title:small}", title=title) for title in titles(besides(d, item), d.after.effects))
+        if others := [*single, *sets_instead(item)]:  # with what is known of sets beforehand
+            few = say("It could as well be: {others}.", others=messages.alternatives(others))
+            many = say("It could as well be one of {count} others; a table below has them.", count=len(others))
+            told = say("{told} {others}", told=told, others=few if len(others) <= INLINE else many)
+        texts.append(after(told, empirical.contained(result.simulated, item.effect)))
     if d.verdict == "partial":
-        texts += empirical_words(d) or [say("And more that no known effect accounts for.")]
-        texts += filter(None, [repeats_words(d)])
+        texts += empirical.empirical_words(d) or [say("And more that no known effect accounts for.")]
+        texts += filter(None, [empirical.repeats_words(d)])
     return lines(texts)
-
-
-def _as_well(others: Sequence[Text]) -> Text:
-    if len(others) <= INLINE:
-        return say("It could as well be: {others}.", others=alternatives(others))
-    return say("It could as well be one of {count} others; a table below has them.", count=len(others))
-
-
-def others_of(d: Diagnosis, item: OmittedEffect) -> list[Text]:
-    """What this recording cannot tell from an effect: single ones, then sets with what is known of them beforehand."""
-    single = titles(besides(d, item), d.after.effects)
-    return [*(say("{title:small}", title=title) for title in single), *sets_instead(item)]
 
 
 def besides(d: Diagnosis, item: OmittedEffect) -> list[str]:
@@ -179,18 +149,17 @@ def _otherwise(d: Diagnosis) -> Text:
     asserted = {item.effect for item in d.effects}
     each = [
         say("{title} {probability}", title=explanation(one), probability=probability(one.probability))
-        for one in d.remaining.rivals if one.probability >= _TOLD and not asserted <= set(one.effects)
-    ]  # fmt: skip
+        for one in d.remaining.rivals
+        if one.probability >= _TOLD and not asserted <= set(one.effects)
+    ]
     return say("Otherwise: {each}.", each=semicolons(each)) if each else NOTHING
 
 
 def _probable(item: OmittedEffect) -> Text:
-    if item.probability < NAMED:
-        return say(
-            "{title} {probability}, it or one that it could as well be {together}",
-            title=item.title, probability=probability(item.probability), together=probability(item.together),
-        )  # fmt: skip
-    return say("{title} {probability}", title=item.title, probability=probability(item.probability))
+    title, chance = item.title, probability(item.probability)
+    one_of = say("{title} {probability}, it or one that it could as well be {together}", title=title, probability=chance,
+                 together=probability(item.together))  # fmt: skip
+    return one_of if item.probability < NAMED else say("{title} {probability}", title=title, probability=chance)
 
 
 def gained(gain: Improvement) -> Text:
@@ -214,31 +183,26 @@ def share_of(p_value: float) -> Text:
 
 def _to_do(result: JobDiagnosis) -> Text:
     d, further = result.diagnosis, result.next_plan is not None
-    told: list[Text] = [*to_mend(result.mistakes)]
-    if told:
-        return lines(told)
-    if further and not d.agrees:
-        told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
-    told += [line for item in d.effects for line in _look_at(d, item)]
-    if d.verdict in ("partial", "unexplained"):
-        look = say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
-        told.append(look)
-    if d.verdict == "empirical":
-        told.append(
-            say("Look for what acts where it is; until that is found, the function can be corrected and counted.")
-        )
-    if d.verdict in ("empirical", "unexplained"):
-        told += filter(None, [nearest_words(d)])
-    if d.verdict == "explained":
-        told.append(say("Then measure again."))
-    if d.verdict == "undetermined":
-        told.append(say("Place the artefact anew in the same set-ups and measure again: what stays is the machine's."))
-    if d.agrees:
-        warned = say("Nothing on account of the machine; see the warnings on the recording.")
-        told.append(warned if result.findings else say("Nothing on account of this recording."))
-        if further:
-            told.append(say("To see what it could not have shown, measure the set-ups that are told below."))
-    return lines(dict.fromkeys(told))
+    if mend := empirical.to_mend(result.mistakes):
+        return lines(mend)
+    misfit, acting = d.verdict in ("partial", "unexplained"), d.verdict in ("empirical", "unexplained")
+    nearest = empirical.nearest_words(d) if acting else NOTHING
+    first = say("First measure the set-ups that are told below, to part what this recording cannot.")
+    return lines(dict.fromkeys((
+        *([first] if further and not d.agrees else []),
+        *(line for item in d.effects for line in _look_at(d, item)),
+        *holding(
+            (misfit, say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")),
+            (d.verdict == "empirical",
+             say("Look for what acts where it is; until that is found, the function can be corrected and counted.")),
+            (nearest, nearest), (d.verdict == "explained", say("Then measure again.")),
+            (d.verdict == "undetermined",
+             say("Place the artefact anew in the same set-ups and measure again: what stays is the machine's.")),
+            (d.agrees and result.findings, say("Nothing on account of the machine; see the warnings on the recording.")),
+            (d.agrees and not result.findings, say("Nothing on account of this recording.")),
+            (d.agrees and further, say("To see what it could not have shown, measure the set-ups that are told below.")),
+        ),
+    )))  # fmt: skip
 
 
 INLINE = 3  # alternatives that a sentence tells; of more there is a table
@@ -269,18 +233,17 @@ def _look_at(d: Diagnosis, item: OmittedEffect) -> list[Text]:
 
 
 def verdict_of(result: JobDiagnosis) -> Text:
-    return (VERDICT_SENTENCES if result.simulated is None else AGAINST_SIMULATION)[result.diagnosis.verdict]
+    return (VERDICT_SENTENCES if result.simulated is None else empirical.AGAINST_SIMULATION)[result.diagnosis.verdict]
 
 
 def summary_lines(result: JobDiagnosis) -> list[Text]:
-    d = result.diagnosis
-    said = [
+    d, measure = result.diagnosis, next_sentence(result)
+    return [
         verdict_of(result),
         *(say("{label}: {text}", label=label, text=text) for label, text in overview_of(result).rows),
-        *withheld_words(d.withheld),
-        *(ambiguous(titles(group, d.after.effects)) for group in d.indistinguishable),
-    ]
-    return [*said, *filter(None, (next_sentence(result),)), *noise_words(d, stated_um(result))]
+        *withheld_words(d.withheld), *(ambiguous(titles(group, d.after.effects)) for group in d.indistinguishable),
+        *([measure] if measure else []), *noise_words(d, stated_um(result)),
+    ]  # fmt: skip
 
 
 def ambiguous(group: Sequence[Text]) -> Text:
@@ -293,11 +256,11 @@ def stated_um(result: JobDiagnosis) -> float | None:
     return stated if stated is None or simulated is None else math.hypot(stated, simulated.u_um, simulated.u_turned_um)
 
 
-def sentence(item: OmittedEffect, gain: Improvement, effects: Iterable[Effect] = ()) -> Text:
+def sentence(item: OmittedEffect, gain: Improvement) -> Text:
     """One left-out effect: size, cause, what it explains, and what was held out says."""
     told = say(
         "{title}: {size}. What it points to: {points_to}. {sure:capital}; {gain}.",
-        title=item.title, size=size_of(effect_of(item.effect, effects), item.parameters), points_to=item.points_to,
+        title=item.title, size=size_of(effect_of(item.effect), item.parameters), points_to=item.points_to,
         sure=sure(item), gain=held_out(gain),
     )  # fmt: skip
     return after(told, other_periods(item))
@@ -308,16 +271,18 @@ def sure(item: OmittedEffect) -> Text:
     if item.probability < NAMED:
         share = say(
             "{share}, {together} that it is this or one that this recording cannot tell from it: {group}",
-            share=share, together=probability(item.together),
+            share=share,
+            together=probability(item.together),
             group=commas(group) if len(group) <= INLINE else say("{count} others", count=len(group)),
-        )  # fmt: skip
+        )
     elif item.together > item.probability + _SAME:
         share = say("{share} ({together} of it or one that cannot be told from it)",
                     share=share, together=probability(item.together))  # fmt: skip
     return say(
         "probability {probability}; explains {explained:.0f}\u00a0% of the misfit",
-        probability=share, explained=100 * item.explained,
-    )  # fmt: skip
+        probability=share,
+        explained=100 * item.explained,
+    )
 
 
 def held_out(gain: Improvement) -> Text:
@@ -334,15 +299,14 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
     low, high = noise.coordinate.interval95
     coordinate = say("Standard uncertainty of a coordinate {value:.2g} µm (95 % interval {low:.2g} to {high:.2g} µm).",
                      value=value, low=low, high=high)  # fmt: skip
-    texts = (
+    return (coordinate, *holding(
         (noise.contradicts_stated and stated_um is not None,
          say("This contradicts the stated {stated_um:g} µm.", stated_um=stated_um or 0.0)),
-        (noise.placing.value > 0.3 * value and diagnosis.verdict != "empirical" and not repeats_words(diagnosis),
+        (noise.placing.value > 0.3 * value and diagnosis.verdict != "empirical" and not empirical.repeats_words(diagnosis),
          say("Each set-up is off by about {value:.2g} µm that its repeats share.", value=noise.placing.value)),
         (noise.correlated_in_time, say("Neighbouring readings are correlated in time.")),
         (noise.heavy_tails, say("The scatter has heavier tails than a normal distribution.")),
-    )  # fmt: skip
-    return (coordinate, *(text for holds, text in texts if holds))
+    ))  # fmt: skip
 
 
 def summary_of(facts: JobFile, verdict: str, sentences: Sequence[Text], found: Iterable[Finding]) -> Summary:
@@ -350,7 +314,7 @@ def summary_of(facts: JobFile, verdict: str, sentences: Sequence[Text], found: I
     first = Headline(verdict.upper(), STANDING[verdict], sentences[0], ())
     warned = tuple(say("{why:capital}.", why=one.why) for one in found)
     machine = Verbatim(facts.machine.name)
-    return Summary(machine, day(facts.job.date), (first,), remarks=tuple(sentences[1:]), warnings=warned)
+    return Summary(machine, messages.day(facts.job.date), (first,), remarks=tuple(sentences[1:]), warnings=warned)
 
 
 _PERIODS = 8  # periods that a sentence tells; results.json has all.
@@ -384,6 +348,5 @@ def _listed(modes: Sequence[Mode]) -> Text:
         value, U = rounded(mode.period.value, mode.period.expanded)
         periods.append(say("{value} ± {U} {unit}: {probability}", value=value, U=U, unit=mode.period.unit,
                            probability=probability(mode.probability)))  # fmt: skip
-    return commas(
-        [*periods, *([say("and {count} more", count=len(modes) - _PERIODS)] if len(modes) > _PERIODS else [])]
-    )
+    left = len(modes) - _PERIODS
+    return commas([*periods, say("and {count} more", count=left)] if left > 0 else periods)

@@ -13,26 +13,15 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
 from cmm_uq.analysis.planning.set_up import odds_words
-from cmm_uq.base.messages import (
-    NOTHING,
-    Text,
-    Verbatim,
-    commas,
-    day,
-    names,
-    number,
-    say,
-    semicolons,
-    sentences,
-    together,
-)
+from cmm_uq.base import messages
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, names, number, say, together
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.diagnosis import overview as words
 from cmm_uq.certificate.diagnosis.empirical import contained, empirical_section, mistakes_section
 from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section, where_section
-from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
-from cmm_uq.certificate.origin import came_about, program
+from cmm_uq.certificate.document import Column, Paragraph, Section, Table, columns, section, table
+from cmm_uq.certificate.origin import attributes, came_about, program
 from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import JobDiagnosis, Outcome
@@ -52,9 +41,7 @@ def diagnosed_outcome(result: JobDiagnosis) -> Outcome:
 
 
 def diagnosis_results(result: JobDiagnosis) -> dict[str, Any]:
-    posterior = result.diagnosis.posterior
-    names = ("sampler", "seed", "ess_min", "rhat_max", "converged")
-    sampling = {name: getattr(posterior, name) for name in names}
+    sampling = attributes(result.diagnosis.posterior, "sampler", "seed", "ess_min", "rhat_max", "converged")
     return {**head(result.job), "sampling": sampling, "diagnosis": diagnosis_data(result)}
 
 
@@ -64,14 +51,15 @@ def diagnosis_document(result: JobDiagnosis) -> doc.Document:
     if simulated is not None:
         explained = say("Compared with the simulation"), commas(names(simulated.files))
     particulars = (
-        (say("Machine"), Verbatim(facts.machine.name)), (say("Artefact"), d.before.artefact.title),
+        (say("Machine"), Verbatim(facts.machine.name)),
+        (say("Artefact"), d.before.artefact.title),
         (say("p-value of “nothing is missing”"), number(d.p_value, ".2g")),
         (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
-    )  # fmt: skip
+    )
     sampler, seed = Verbatim(d.posterior.sampler), d.posterior.seed
     return doc.working_page(
         facts, say("Diagnosis"),
-        say("{came_about} {date}", came_about=came_about(result.job), date=day(facts.job.date)),
+        say("{came_about} {date}", came_about=came_about(result.job), date=messages.day(facts.job.date)),
         overview=words.overview_of(result),
         particulars=(doc.Facts(particulars), doc.Facts((explained, *wording.stated_physics()))),
         warnings=(say("{why:capital}.", why=f.why) for f in result.findings), sections=_sections(result),
@@ -91,7 +79,7 @@ def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
     compared: tuple[Section, ...] = ()
     if simulated is not None:
         compared = (simulation_section(simulated, corrections(result, simulated)), mistakes_section(result.mistakes))
-    sections = (
+    return tuple(section for section in (
         Section(say("What was left out"), _left_out(result)), where_section(d),
         empirical_section(d, _improved),
         Section(say("What remains"), _consistent(result)), next_section(result),
@@ -99,8 +87,7 @@ def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
         section(say("What a correction would change"), *_consequences(result)),
         costs_section(result), unseen_section(result), *compared,
         section(say("Noise"), *map(doc.Paragraph, noise)), section(say("Candidate explanations"), _rivals(d)),
-    )  # fmt: skip
-    return tuple(section for section in sections if section.blocks)
+    ) if section.blocks)  # fmt: skip
 
 
 def _left_out(result: JobDiagnosis) -> tuple[doc.Block, ...]:
@@ -124,7 +111,7 @@ def _alternatives(d: Diagnosis) -> doc.Table | None:
         for of, instead, *odds in (*single, *told):
             found, other = (together(wording.titles(each, d.after.effects)) for each in (of, instead))
             acting = (wording.effect_of(name, d.after.effects) for name in instead)
-            look = semicolons(dict.fromkeys(effect.points_to for effect in acting if effect is not None))
+            look = messages.semicolons(dict.fromkeys(effect.points_to for effect in acting if effect is not None))
             rows.setdefault((found, other), (found, other, *odds, look))
     if len(rows) <= words.INLINE:
         return None
@@ -145,7 +132,7 @@ def _effect(result: JobDiagnosis, item: OmittedEffect) -> doc.Facts:
     told = (size, words.other_periods(item), contained(result.simulated, item.effect))
     return doc.Facts((
         (say("Effect"), item.title),
-        (say("Size"), sentences(filter(None, told))),
+        (say("Size"), messages.sentences(filter(None, told))),
         (say("Look at"), say("{what:capital}.", what=item.points_to)),
         (say("How sure"), say("{sure:capital}.", sure=words.sure(item))),
         (say("Gain"), say("{gain:capital}.", gain=words.held_out(d.improvement))),
@@ -209,16 +196,12 @@ def _changes(d: Diagnosis) -> doc.Table | None:
     for u, value, known in zip(before.unknowns, before.value, before.determined, strict=True):
         if known and not u.known:
             digits = 10 if u.key[0] == ARTEFACT else 4
-            rows.append((_title_of(u.key, d.before), figure(value, digits), figure(late[u.key], digits), u.unit))
+            owner, name = u.key
+            sizes = (size.title for size in d.before.artefact.sizes if owner == ARTEFACT and size.name == name)
+            title = next(sizes, None) or wording.parameter_title(owner, name, d.before.effects)
+            rows.append((title, figure(value, digits), figure(late[u.key], digits), u.unit))
     heads = (say("Parameter"), doc.Column(say("Before")), doc.Column(say("After")), say("Unit"))
     return table(say("What it changes in the estimates (least squares)"), heads, rows)
-
-
-def _title_of(key: tuple[str, str], model: RecordingModel) -> Text:
-    owner, name = key
-    if owner == ARTEFACT:
-        return next(size.title for size in model.artefact.sizes if size.name == name)
-    return wording.parameter_title(owner, name, model.effects)
 
 
 def _consequences(result: JobDiagnosis) -> tuple[doc.Table | None, ...]:
@@ -250,28 +233,28 @@ def _consequences(result: JobDiagnosis) -> tuple[doc.Table | None, ...]:
 
 
 def _rivals(d: Diagnosis) -> doc.Table:
-    notes: list[Text] = [say("Nothing missing has the rest.")]
     some, every = d.compared, int(d.before.used.sum())
-    if some < every:
-        notes.append(say(
-            "Explanations were compared on {some} of {every} observations, drawn at random; what is asserted was then "
-            "estimated from all. An error much smaller than the noise, which only all together would show, can go unnoticed.",
-            some=some, every=every,
-        ))  # fmt: skip
+    drawn = say(
+        "Explanations were compared on {some} of {every} observations, drawn at random; what is asserted was then "
+        "estimated from all. An error much smaller than the noise, which only all together would show, can go unnoticed.",
+        some=some,
+        every=every,
+    )
     heads = doc.columns((say("Explanation"), doc.Column(say("Probability"))))
     rows = tuple((wording.effect_title(name), wording.probability(p)) for name, p in d.rivals)
+    notes = messages.holding((True, say("Nothing missing has the rest.")), (some < every, drawn))
     return doc.Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
 
 
 def simulation_section(simulated: SimulatedTwin, refitted: Mapping[str, Mapping[str, Quantity]]) -> Section:
     """Which simulation it was, and what of it was estimated anew."""
-    u = say("{u:.3g} µm", u=simulated.u_um)
-    if not simulated.u_um and not simulated.u_common_um:
-        u = say("not stated: taken as exact")
-    elif common := simulated.u_common_um:
+    u, common = say("{u:.3g} µm", u=simulated.u_um), simulated.u_common_um
+    if common:
         u = say("{own}, and {common:.3g} µm of the artefact's size in common", own=u, common=common)
+    elif not simulated.u_um:
+        u = say("not stated: taken as exact")
     file = say("Error map") if simulated.maps else say("Prediction")
-    rows = (
+    facts = doc.facts(
         *((file, Verbatim(name)) for name in simulated.files),
         *((say("SHA-256"), Verbatim(value)) for value in simulated.files.values()),
         (say("Program"), Verbatim(simulated.program)),
@@ -286,11 +269,12 @@ def simulation_section(simulated: SimulatedTwin, refitted: Mapping[str, Mapping[
     )
     differing = (
         (wording.parameter_title(owner, name), wording.with_uncertainty(one), one.unit, wording.expanded(one)[2])
-        for owner, quantities in refitted.items() for name, one in quantities.items()
-    )  # fmt: skip
+        for owner, quantities in refitted.items()
+        for name, one in quantities.items()
+    )
     heads = (say("Parameter"), Column(say("Machine minus simulation")), say("Unit"), Column(say("k")))
     anew = table(say("What the simulation contains, estimated anew"), heads, differing)
-    return section(say("Simulation"), Facts(tuple(row for row in rows if row[1])), Paragraph(told), anew)
+    return section(say("Simulation"), facts, Paragraph(told), anew)
 
 
 def improvement_table(gain: Improvement, rms: Text, heldout: Text, note: Text) -> Table:

@@ -13,7 +13,7 @@ from cmm_uq.analysis.diagnosis.power import ALLOWED
 from cmm_uq.analysis.diagnosis.smallest import PLACES, POWER, PeriodRange, SmallestEffect
 from cmm_uq.analysis.planning.set_up import ODDS, NextPlan, odds_words, rounded
 from cmm_uq.base import messages
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say, signed, together
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, holding, number, plural, say, signed, together
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.certificate import wording
@@ -62,8 +62,9 @@ def next_sentence(result: JobDiagnosis) -> Text:
     if odds and not reached and not plan.shown:
         return say(
             "No set-up that was tried is expected to part what this recording cannot: odds of {odds} : 1 at best for the "
-            "true one. Another artefact is needed for that.", odds=rounded(max(odds)),
-        )  # fmt: skip
+            "true one. Another artefact is needed for that.",
+            odds=rounded(max(odds)),
+        )
     if not reached:
         return told
     least = rounded(min(reached))
@@ -130,15 +131,17 @@ def costs_section(result: JobDiagnosis) -> Section:
         told=told,
     )
     left = plural(
-        more, one=say("One further explanation is in results.json."),
+        more,
+        one=say("One further explanation is in results.json."),
         many=say("{count} further explanations are in results.json.", count=more),
-    )  # fmt: skip
+    )
     follows = table(
         say("What follows from each explanation that remains"),
         (say("Quantity"), *heads, Column(say("Averaged")), say("Unit")),
         _cost_rows(result) if rivals else (),  # none as against a simulation, where no effect of the job takes part
-        note, messages.after(left if more else NOTHING, share),
-    )  # fmt: skip
+        note,
+        messages.after(left if more else NOTHING, share),
+    )
     return section(say("What the choice of an explanation costs"), follows)
 
 
@@ -195,8 +198,9 @@ def unseen_section(result: JobDiagnosis) -> Section:
     """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
     rows = [
         (row.title, _found(row, row.detected), _found(row, row.named), _size(row.allowed, row.unit), _why(row))
-        for row in result.unseen if row.common or not row.shown
-    ]  # fmt: skip
+        for row in result.unseen
+        if row.common or not row.shown
+    ]
     heads = (
         say("Error"), Column(say("Found from")), Column(say("Named from")), Column(say("Reckoned with up to")),
         say("Why, and for which periods"),
@@ -221,27 +225,21 @@ def _size(value: float, unit: Unit) -> Text:
 
 
 def _why(row: SmallestEffect) -> Text:
-    takers = messages.listed([*map(_taker, row.taken_up)])
-    said: list[Text] = []
-    if row.taken_up:
-        said.append(say("taken up by {effects}", effects=takers) if row.share < 1e-3 else
-                    say("mostly taken up by {effects}", effects=takers))  # fmt: skip
-    elif row.share == 0:
-        said.append(say("moves nothing that is observed here"))
-    if row.detected is not None and row.allowed < row.detected < 100 * row.allowed:
-        said.append(say("it would take {size}", size=_size(row.detected, row.unit)))
-    if row.periods is not None:
-        said.append(_periods(row.periods, row))
-    return messages.commas(said) if said else messages.DASH
+    takers, beyond, periods = messages.listed([*map(_taker, row.taken_up)]), row.detected, row.periods
+    mostly = say("mostly taken up by {effects}", effects=takers)
+    far = beyond is not None and row.allowed < beyond < 100 * row.allowed
+    return messages.commas(holding(
+        (takers, say("taken up by {effects}", effects=takers) if row.share < 1e-3 else mostly),
+        (not takers and row.share == 0, say("moves nothing that is observed here")),
+        (far, say("it would take {size}", size=_size(beyond or 0.0, row.unit))),
+        (periods, NOTHING if periods is None else _periods(periods, row)),
+    )) or messages.DASH  # fmt: skip
 
 
 def _taker(name: str) -> Text:
-    if name == PLACES:
-        return say("the place of the artefact")
-    if name == ARTEFACT:
-        return say("the size of the artefact")
     effect = every().get(name)
-    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
+    own = {PLACES: say("the place of the artefact"), ARTEFACT: say("the size of the artefact")}
+    return own.get(name, Verbatim(name) if effect is None else say("{title:small}", title=effect.title))
 
 
 def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
@@ -308,10 +306,11 @@ def where_sentence(d: Diagnosis) -> Text:
         spread = say("No reading, column or direction by itself carries the evidence: it is spread over the recording.")
         return by_columns(d) or spread
     first = d.where[0]
-    size = significant(first.amplitude_um)
-    told = say("The evidence lies {place}: up to {size} µm.", place=place_words(first), size=size)
-    others = say("It could as well be read as {others}.", others=messages.alternatives(first.also))
-    return messages.after(told, others if first.also else NOTHING)
+    told = say(
+        "The evidence lies {place}: up to {size} µm.", place=place_words(first), size=significant(first.amplitude_um)
+    )
+    others = messages.alternatives(first.also)
+    return messages.after(told, say("It could as well be read as {others}.", others=others) if others else NOTHING)
 
 
 def field_picture(d: Diagnosis) -> Plot | None:

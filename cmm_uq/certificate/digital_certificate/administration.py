@@ -161,7 +161,6 @@ def laboratory(job: Job, texts: Languages) -> dcc.CalibrationLaboratory:
 
 
 def persons(job: Job, texts: Languages) -> tuple[dcc.Person, ...]:
-    """Who authorises the certificate, and who measured."""
     facts, operator = job.facts.laboratory, job.facts.job.operator
     if not certifies(job):
         return (dcc.Person(person=somebody(_NOBODY, texts)),)
@@ -243,7 +242,6 @@ def methods(job: Job, results: Mapping[str, Any], texts: Languages) -> tuple[dcc
 
 
 def software(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.Software, ...]:
-    """The program, and other packages that took part."""
     used = results["software"]
     named = {used["name"]: used["version"], **used.get("plugins", {})}
     return tuple(

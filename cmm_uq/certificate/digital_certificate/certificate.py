@@ -33,23 +33,16 @@ IN_THE_SCHEMA: Mapping[str, str] = MappingProxyType({
     "pass": "pass", "fail": "fail", "conditional pass": "conditionalPass", "conditional fail": "conditionalFail",
     "undecided": "noPass", "incomplete": "noPass", "remeasure": "noPass",
 })  # fmt: skip
-_WHY: Mapping[str, Text] = MappingProxyType({
-    "undecided": say("Neither conformity nor nonconformity is proved by the rule, so noPass: conformity is not stated."),
-    "incomplete": say(
-        "What was measured conforms, but the test lacks what is named as missing, so noPass: conformity is not stated."
-    ),
-    "remeasure": say(
-        "The standard asks for further readings before anything is decided, so noPass: conformity is not stated."
-    ),
+_WHY: Mapping[str, tuple[Text, ...]] = MappingProxyType({
+    "undecided": (say("Neither conformity nor nonconformity is proved by the rule, so noPass: conformity is not stated."),),
+    "incomplete": (say(
+        "What was measured conforms, but the test lacks what is named as missing, so noPass: conformity is not stated."),),
+    "remeasure": (say(
+        "The standard asks for further readings before anything is decided, so noPass: conformity is not stated."),),
 })  # fmt: skip
 
 _MICROMETRE, _MILLIMETRE = UNITS["µm"].dsi, UNITS["mm"].dsi
 _P_TWICE = Decimal("0.9545")  # probability of a normal distribution within two standard deviations
-
-
-def of_tolerances(verdicts: Verdicts, texts: Languages, *, certifies: bool) -> Mapping[str, dcc.StatementMetadata]:
-    """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result."""
-    return {verdict.name: _of_tolerance(verdict, texts, certifies=certifies) for verdict in verdicts if not verdict.by}
 
 
 def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> dcc.StatementMetadata:
@@ -58,7 +51,7 @@ def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> dcc
     return texts(
         "StatementMetadata", name=say("Conformity with its tolerance"), references=(TOLERANCE_RULE,),
         description=english([f"Missing: {what}" for what in verdict.missing]) if verdict.missing else None,
-        declaration=(Verbatim(verdict.outcome), *_why(verdict.outcome)),
+        declaration=(Verbatim(verdict.outcome), *_WHY.get(verdict.outcome, ())),
         conformity=IN_THE_SCHEMA[verdict.outcome] if certifies else None,
         data=dcc.Data(parts=tuple(
             texts("DccQuantity", name=name, value=dcc.Real(value=bound, unit=unit), ref_type="cmm_toleranceLimit")
@@ -68,10 +61,6 @@ def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> dcc
     )  # fmt: skip
 
 
-def _why(decision: str) -> tuple[Text, ...]:
-    return (_WHY[decision],) if decision in _WHY else ()
-
-
 def _ref_type(decision: str, *, certifies: bool) -> tuple[str, ...]:
     return ("basic_conformity", f"cmm_{decision.replace(' ', '')}") if certifies else ("cmm_notCertified",)
 
@@ -79,7 +68,6 @@ def _ref_type(decision: str, *, certifies: bool) -> tuple[str, ...]:
 def statement(
     i: int, entry: Mapping[str, Any], figures: plain.DigitalFigures, *, certifies: bool
 ) -> dcc.StatementMetadata:
-    """Of a decision of results.json, by its number there."""
     texts, decision, path = figures.texts, entry["decision"], ("conformity", str(i))
     standard, characteristic = Verbatim(entry["standard"]), Verbatim(entry["characteristic"])
     named = say("{standard}, {characteristic}", standard=standard, characteristic=characteristic)
@@ -91,7 +79,7 @@ def statement(
     return texts(
         "StatementMetadata", id=figures.id_of(path), name=named, description=english(remarks) if remarks else None,
         norms=(one_line(entry["standard"]),), references=(one_line(entry["rule"]),),
-        declaration=(quantity, row, *_why(decision)), conformity=IN_THE_SCHEMA[decision] if certifies else None,
+        declaration=(quantity, row, *_WHY.get(decision, ())), conformity=IN_THE_SCHEMA[decision] if certifies else None,
         data=dcc.Data(parts=tuple(_figures(path, entry, figures))), ref_type=_ref_type(decision, certifies=certifies),
     )  # fmt: skip
 
@@ -200,7 +188,11 @@ def digital_certificate(
     # estimates that are in a combination that the recording does not determine, ``scale_x.ppm``
     undetermined = results.get("identifiability", {}).get("undetermined", ())
     free = frozenset(name for combination in undetermined for name in combination)
-    figures = plain.DigitalFigures(texts, free, of_tolerances(Verdicts.of_results(results), texts, certifies=real))
+    # statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result
+    limited = {
+        one.name: _of_tolerance(one, texts, certifies=real) for one in Verdicts.of_results(results) if not one.by
+    }
+    figures = plain.DigitalFigures(texts, free, limited)
     stated = [statement(i, entry, figures, certifies=real) for i, entry in enumerate(decided)]
     # results.json itself: what D-SI has no place for stands there
     content = as_json(results) if file is None else file

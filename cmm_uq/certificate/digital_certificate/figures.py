@@ -137,8 +137,9 @@ def is_curve(value: Any, u: Any, interval: Any) -> bool:
     low, high = interval
     return (
         all(are_numbers(series, len(value)) for series in (u, low, high))
-        and min(u) >= 0 and all(a <= b for a, b in zip(low, high, strict=True))
-    )  # fmt: skip
+        and min(u) >= 0
+        and all(a <= b for a, b in zip(low, high, strict=True))
+    )
 
 
 def plain_cell(value: Any) -> bool:
@@ -226,8 +227,12 @@ class DigitalFigures:
         elif is_budget(value):
             yield from self._parts_of(path, self._budget(path, value))
         elif is_matrix(value):
-            units = [dsi_of(symbol) for symbol in value["units"]]
-            yield from self._parts_of(path, self._matrix((*path, "matrix"), value["matrix"], units))
+            units = [dsi_of(symbol) for symbol in value["units"]]  # an element is in the product of two
+            columns = [[product(unit, other) for other in units] for unit in units]
+            rows = (_series(*each) for each in zip(value["matrix"], columns, strict=True))
+            yield from self._parts_of(
+                path, (self._quantity((*path, "matrix", str(i)), row) for i, row in enumerate(rows))
+            )
         else:
             yield from self._parts_of(path, self._keys(path, value, named_unit(path[-1]) or above))
 
@@ -311,7 +316,6 @@ class DigitalFigures:
                 yield from self._column((*path, key), [row.get(key) for row in rows])
 
     def _column(self, path: Path, cells: Sequence[Any]) -> Iterator[Element]:
-        """A column, of which cells may have no figure."""
         values, unit = [cell for cell in cells if cell is not None], unit_of(path[-1], None)
         if not values:
             return
@@ -340,11 +344,6 @@ class DigitalFigures:
         if intervals is not None and not all(map(symmetric, quantities)):
             yield self._interval(path, column.with_changes(uncertainty=intervals))
 
-    def _matrix(self, path: Path, rows: Sequence[Sequence[float]], units: Sequence[str]) -> Iterator[Element]:
-        """A covariance matrix, row by row, each element in the product of its units."""
-        for i, (row, unit) in enumerate(zip(rows, units, strict=True)):
-            yield self._quantity((*path, str(i)), _series(row, [product(unit, other) for other in units]))
-
     def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Element]:
         unit = dsi_of(data["unit"])
         if data["value"] is not None:
@@ -355,7 +354,6 @@ class DigitalFigures:
         yield from self._parts_of((*path, "budget"), self._lines(path, data["budget"], unit), say("Uncertainty budget"))
 
     def _lines(self, path: Path, lines: Sequence[Mapping[str, Any]], unit: str) -> Iterator[Element]:
-        """Of a budget, column by column."""
         for key in ("input", "distribution", "source"):
             yield self._quantity((*path, "budget", key), _texts([line[key] for line in lines]))
         inputs, ones = [dsi_of(line["unit"]) for line in lines], [ONE.dsi] * len(lines)

@@ -104,15 +104,11 @@ MOST_MACHINES = 15
 """Machines of a value that do not belong, that are beyond their limit, and that cross it soonest: so many each."""
 
 SPREADS: dict[str, Text] = {
-    "rate_sd": say("Rates of machines of one model and place differ by"),
-    "model_sd": say("Rates of models differ by"),
-    "place_sd": say("Rates of places differ by"),
-    "walk": say("Wandering adds in a year"),
-    "first_sd": say("Errors at the first certificate"),
-    "as_left_sd": say("Errors after an adjustment"),
-    "steps_per_year": say("Steps in a year"),
-    "step_sd": say("Size of a step"),
-}
+    "rate_sd": say("Rates of machines of one model and place differ by"), "model_sd": say("Rates of models differ by"),
+    "place_sd": say("Rates of places differ by"), "walk": say("Wandering adds in a year"),
+    "first_sd": say("Errors at the first certificate"), "as_left_sd": say("Errors after an adjustment"),
+    "steps_per_year": say("Steps in a year"), "step_sd": say("Size of a step"),
+}  # fmt: skip
 
 
 def all_values(found: FleetResult) -> Table:
@@ -127,8 +123,9 @@ def all_values(found: FleetResult) -> Table:
     figures = (Column(head) for head in (say("Unlike the fleet"), say("Beyond the limit"), say("Beyond within a year")))
     note = say(
         "Beyond: at a machine's last certificate, and by {day}, a year after the newest of all, each with a probability of "
-        "50 % or more.", day=words.date_of(until),
-    )  # fmt: skip
+        "50 % or more.",
+        day=words.date_of(until),
+    )
     heads = columns((say("Value"), Column(say("Machines")), say("Average drift, U (95 %)"), *figures))
     return Table(say("What is usual, and how many machines matter"), heads, tuple(rows), (note,))
 
@@ -172,8 +169,9 @@ def outsiders(of: FleetValue) -> doc.Block:
     )
     note = say(
         "Compared with what all other machines let expect, before its own certificates; of all machines and values named so, "
-        "about {part:.0f} % are by chance (Benjamini and Hochberg).", part=100 * FALSE_DISCOVERIES,
-    )  # fmt: skip
+        "about {part:.0f} % are by chance (Benjamini and Hochberg).",
+        part=100 * FALSE_DISCOVERIES,
+    )
     left = () if len(shown) == len(which) else (_left_out(len(shown), len(which)),)
     return Table(say("Machines that do not belong"), heads, rows, (note, *left))
 
@@ -263,11 +261,12 @@ def fleet_document(found: FleetResult) -> Document:
 def _blocks(of: FleetValue) -> tuple[doc.Block, ...]:
     shown, fleet = groups_shown(of), of.fleet
     plot = fleet_plot(
-        shown, [words.group_words(each) for each in shown],
+        shown,
+        [words.group_words(each) for each in shown],
         axis=say("Rate in {unit}, with 95 % interval", unit=words.per_year(of)),
         caption=say("Usual drift of models and places."),
         alternative=say("Average machine: {rate}.", rate=words.usual_rate(of)),
-    )  # fmt: skip
+    )
     sampled = say(
         "Hyper-parameters by importance sampling from {machines}: {draws} draws, worth {worth} independent ones.",
         machines=words.counted(fleet.learnt_from), draws=fleet.draws, worth=number(fleet.worth, ".0f"),

@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from cmm_uq import __version__
 from cmm_uq.base.files.csv_table import FORMULA
-from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, commas, day, number, plural, say, signed
+from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, commas, day, holding, number, plural, say, signed
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate.document import Overview, Standing
+from cmm_uq.certificate.origin import attributes
 from cmm_uq.certificate.wording import Headline, Summary
 from cmm_uq.laboratory.due.fleet import FleetResult, FleetValue, UsualRate, seen_again
 
@@ -98,7 +99,6 @@ def _standings(found: FleetResult) -> _Standings:
 
 
 def fleet_overview(found: FleetResult) -> Overview:
-    """What comes before everything else on the page."""
     machines = _standings(found)
     word, standing = _verdict(found, machines)
     rows = (
@@ -122,7 +122,7 @@ def fleet_summary(found: FleetResult) -> Summary:
     none = Headline("ALIKE" if found.compared else "UNKNOWN", standing, word, (_compared(found),))
     left, beyond = len(outsiders) - MOST_VERDICTS, len(machines.beyond)
     are = say("{count} machines are beyond a limit", count=beyond)
-    remarks = (
+    remarks = holding(
         (left > 0, say("{count} more values of machines differ, less clearly: fleet.json has all", count=left)),
         (beyond, plural(beyond, one=say("One machine is beyond a limit"), many=are)),
         (machines.soon, say("{machines:capital} will probably be beyond a limit by {day}",
@@ -135,7 +135,7 @@ def fleet_summary(found: FleetResult) -> Summary:
              usual_rate(of), _counts(of, found.in_a_year))
             for of in found.values
         ),
-        remarks=tuple(text for holds, text in remarks if holds),
+        remarks=tuple(remarks),
         details=tuple(
             (say("{quantity}: {group:small}", quantity=Verbatim(of.quantity), group=group_words(each)),
              rate_words(each.rate, 1.96 * each.u, of), counted(each.machines))
@@ -164,9 +164,10 @@ def _compared(found: FleetResult) -> Text:
     count = len({member.machine for of in found.values for member in of.members if seen_again(member)})
     total = len(machines_of(found))
     return plural(
-        count, one=say("one machine of {total} has certificates of two days", total=total),
+        count,
+        one=say("one machine of {total} has certificates of two days", total=total),
         many=say("{count} machines of {total} have certificates of two days", count=count, total=total),
-    )  # fmt: skip
+    )
 
 
 def _counts(of: FleetValue, until: float) -> Text:
@@ -199,13 +200,13 @@ def _warnings(of: FleetValue) -> list[Text]:
     )  # fmt: skip
     alone = say("{value}: one machine is no fleet; what machines have in common is assumed, not learnt", value=value)
     assumed = say("{value}: no machine has certificates of two days; drift is assumed, not learnt", value=value)
-    single = say("{value}: only one machine has certificates of two days; no other shows a drift to compare it with",
-                 value=value)  # fmt: skip
-    warnings = (
+    single = say(
+        "{value}: only one machine has certificates of two days; no other shows a drift to compare it with", value=value
+    )
+    return holding(
         (not fleet.converged, rough), (of.left_out, left_out), (len(of.members) == 1, alone), (not again, assumed),
         (again == 1 < len(of.members), single),
     )  # fmt: skip
-    return [text for holds, text in warnings if holds]
 
 
 SCHEMA = "cmm-uq/fleet/1"
@@ -236,7 +237,7 @@ def _machines(of: FleetValue) -> list[dict[str, Any]]:
     e = of.fleet.estimates
     return [
         {
-            "machine": member.machine, "model": member.model, "place": member.place,
+            **attributes(member, "machine", "model", "place"),
             "certificates": len(member.history.day), "rate": float(e.rate[i]), "u": float(e.u_rate[i]),
             "expected": float(e.expected[i]), "u_expected": float(e.u_expected[i]), "p": float(e.p[i]),
             "belongs": bool(of.belongs[i]), "limit": member.limit,
@@ -250,8 +251,9 @@ def fleet_csv(data: Mapping[str, Any]) -> bytes:
     """A row a machine and value of :func:`fleet_data`; a name that a spreadsheet would compute has an apostrophe."""
     rows = [
         {"value": of["name"], "quantity": of["quantity"], "unit": of["unit"], **one} | (one["crossing"] or {})
-        for of in data["values"] for one in of["machines"]
-    ]  # fmt: skip
+        for of in data["values"]
+        for one in of["machines"]
+    ]
     text = io.StringIO()
     columns = [*(name for name in rows[0] if name not in ("crossing", *_CROSSING)), *_CROSSING]
     writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons, sentences
+from cmm_uq.base import messages
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, holding, number, plural, say, semicolons
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate import document as doc
+from cmm_uq.certificate.origin import attributes
 from cmm_uq.certificate.plots.style import ACCENT, BAD, BAND, INK, MUTED, bars, dots, drawn, note, picture
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.verdicts import BEYOND, NONE
@@ -108,7 +110,7 @@ def step_notes(history: MachineHistory) -> tuple[Text, ...]:
             words = say(
                 "In doubt for what was measured after {day}: {certificates}.", day=_date(step.after), certificates=names
             )
-            found[-1] = sentences([found[-1], words])
+            found[-1] = messages.sentences([found[-1], words])
     return tuple(found)
 
 
@@ -120,12 +122,12 @@ def model_note(history: MachineHistory) -> Text:
     return say(
         "The day on which a limit is crossed is by {model} (about: with a probability of 50 %; not "
         "before: 5 %; by: 95 %; never: later than {horizon} years), not by the straight line.",
-        model=model, horizon=number(HORIZON, "g"),
-    )  # fmt: skip
+        model=model,
+        horizon=number(HORIZON, "g"),
+    )
 
 
 def terminal_note(history: MachineHistory) -> Text:
-    """What the rows of a terminal mean, in one line."""
     factor, foreseen = say("Every ± has k = 2."), any(one.crossing and not one.beyond for one in history.values)
     return say("{factor} {model}", factor=factor, model=model_note(history)) if foreseen else factor
 
@@ -157,15 +159,14 @@ def history_data(history: MachineHistory) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "on": history.on.isoformat(),
-        "machine": {
-            "serial": machine.serial, "name": machine.name, "manufacturer": machine.manufacturer, "model": machine.model,
-            "place": machine.place, "adjusted": [one.isoformat() for one in machine.adjusted],
+        "machine": attributes(machine, "serial", "name", "manufacturer", "model", "place") | {
+            "adjusted": [one.isoformat() for one in machine.adjusted],
         },
         "decision": history.decision,
         "remarks": [str.__str__(text) for text in history.remarks],
         "certificates": [
-            {"entry": one.entry, "job": one.job, "number": one.number, "date": one.day.isoformat(), "state": one.state,
-             "decision": one.decision, "diagnosis": one.diagnosis, "interim": one.interim, "artefact": one.artefact,
+            {**attributes(one, "entry", "job", "number"), "date": one.day.isoformat(),
+             **attributes(one, "state", "decision", "diagnosis", "interim", "artefact"),
              "adjusted_since": None if one.adjusted_since is None else one.adjusted_since.isoformat()}
             for one in history.certificates
         ],
@@ -180,8 +181,7 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
     rows = zip(dates, *columns, strict=True)
     change, line, crossing = one.change, one.line, one.crossing
     return {
-        "quantity": series.quantity, "unit": series.unit, "limit": series.limit, "beyond_limit": one.beyond,
-        "outcome": one.outcome or None,
+        **attributes(series, "quantity", "unit", "limit"), "beyond_limit": one.beyond, "outcome": one.outcome or None,
         "recorded": [
             {"date": date, "value": float(value), "u": float(u), "u_artefact": float(common), "artefact": str(artefact),
              "entry": int(entry), "interim": bool(interim)}
@@ -197,7 +197,7 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
         },
         "steps": [
             {"after": dt.date.fromordinal(step.after).isoformat(), "by": dt.date.fromordinal(step.by).isoformat(),
-             "probability": step.probability, "size": step.size, "u": step.u,
+             **attributes(step, "probability", "size", "u"),
              "in_doubt": [certificate.entry for certificate in history.in_doubt(one, step)]}
             for step in one.steps
         ],
@@ -240,12 +240,11 @@ def trend_plot(history: MachineHistory, one: ValueHistory) -> doc.Plot:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.ticklabel_format(axis="x", useOffset=False, style="plain")
         ax.grid(axis="y")
-        parts = (
+        note(figure, semicolons(holding(
             (True, say("bars: U (k = 2)")), (series.limit is not None, say("dashed: limits")),
             (one.line is not None, say("line: straight trend with its U")), (adjusted, say("dotted: adjusted")),
-            (check.any(), say("hollow: interim checks")), (bool(one.steps), say("shaded: a step")),
-        )  # fmt: skip
-        note(figure, semicolons([text for is_drawn, text in parts if is_drawn]))
+            (check.any(), say("hollow: interim checks")), (one.steps, say("shaded: a step")),
+        )))  # fmt: skip
         return drawn(figure, say("{name} over time.", name=Verbatim(series.quantity)), _told(history, one), "trend")
 
 
@@ -286,20 +285,18 @@ def _told(history: MachineHistory, one: ValueHistory) -> Text:
 
 def history_document(history: MachineHistory) -> doc.Document:
     machine = history.machine
-    given = (
-        (say("Machine"), machine.name), (say("Serial number"), "" if machine.by_name else machine.serial),
-        (say("Manufacturer"), machine.manufacturer), (say("Model"), machine.model), (say("Place"), machine.place),
-    )  # fmt: skip
     checks = sum(one.interim for one in history.certificates)
     count = len(history.certificates) - checks
     counted: Text = plural(count, one=say("one certificate"), many=say("{count} certificates", count=count))
     if checks:
         more = plural(checks, one=say("one interim check"), many=say("{count} interim checks", count=checks))
         counted = say("{certificates}, {checks}", certificates=counted, checks=more)
-    particulars: list[tuple[Text, Text]] = [(label, Verbatim(text)) for label, text in given if text]
-    particulars.append((say("Recordings"), counted))
-    if machine.adjusted:
-        particulars.append((say("Adjusted"), commas([day(when) for when in machine.adjusted])))
+    serial, manufacturer = Verbatim("" if machine.by_name else machine.serial), Verbatim(machine.manufacturer)
+    particulars = doc.facts(
+        (say("Machine"), Verbatim(machine.name)), (say("Serial number"), serial), (say("Manufacturer"), manufacturer),
+        (say("Model"), Verbatim(machine.model)), (say("Place"), Verbatim(machine.place)), (say("Recordings"), counted),
+        (say("Adjusted"), commas(day(when) for when in machine.adjusted)),
+    )  # fmt: skip
     heads = tuple(doc.Column(heading, numeric=heading not in WORDS) for heading in HEADINGS)
     rows, steps = [value_row(history, one) for one in history.values], step_notes(history)
     values = doc.table(say("Error factors and figures of performance"), heads, rows, *notes(history))
@@ -312,7 +309,7 @@ def history_document(history: MachineHistory) -> doc.Document:
     subject = say("{name}, up to {on}", name=Verbatim(machine.name), on=day(history.on))
     return doc.program_page(
         say("History of a machine"), Verbatim(machine.serial), subject, (one for one in sections if one.blocks),
-        "history.json", particulars=(doc.Facts(tuple(particulars)),), warnings=history.remarks, end=say("End of history"),
+        "history.json", particulars=(particulars,), warnings=history.remarks, end=say("End of history"),
         overview=overview_of(history),
     )  # fmt: skip
 
@@ -326,25 +323,22 @@ def overview_of(history: MachineHistory) -> doc.Overview:
     fails, open_ = bool(beyond) or last in BEYOND, last not in (*BEYOND, "pass", NONE)
     doubtful = open_ or probable or changed or not history.values
     standing: doc.Standing = "bad" if fails else "open" if doubtful else "good"
-    verdicts = (
+    verdict, *_ = holding(
         (not history.values, say("Nothing is recorded yet")), (fails, say("Beyond its limits")),
         (open_, say("Its last certificate does not state that it conforms")),
         (probable, say("Probably beyond a limit by now")), (changed, say("Changed since the last time")),
         (True, say("No change that stands out")),
     )  # fmt: skip
-    rows: list[tuple[Text, Text]] = []
-    if last != NONE:
-        rows.append((say("Last decision"), OUTCOME_WORDS.get(last, Verbatim(last))))
-    rows += [(label, commas(names)) for label, names in (
-        (say("Beyond a limit"), beyond), (say("Changed significantly"), changed),
-    ) if names]  # fmt: skip
-    ahead = ((one.crossing, one) for one in history.values if one.crossing is not None and not one.beyond)
-    medians = ((crossing.quantile(0.5), one) for crossing, one in ahead)
-    first = min(((when, one) for when, one in medians if when is not None), key=lambda pair: pair[0], default=None)
-    if first is not None:
-        name, when = Verbatim(first[1].series.quantity), meets(first[1], history.on)
-        rows.append((say("First to cross its limit"), say("{name}: {when}", name=name, when=when)))
-    return doc.Overview(next(text for holds, text in verdicts if holds), standing, tuple(rows))
+    ahead = ((one.crossing.quantile(0.5), one) for one in history.values if one.crossing is not None and not one.beyond)
+    known = sorted(((when, one) for when, one in ahead if when is not None), key=lambda pair: pair[0])
+    first = [
+        say("{name}: {when}", name=Verbatim(one.series.quantity), when=meets(one, history.on)) for _, one in known[:1]
+    ]
+    return doc.Overview(verdict, standing, doc.facts(
+        (say("Last decision"), OUTCOME_WORDS.get(last, Verbatim(last)) if last != NONE else NOTHING),
+        (say("Beyond a limit"), commas(beyond)), (say("Changed significantly"), commas(changed)),
+        (say("First to cross its limit"), commas(first)),
+    ).rows)  # fmt: skip
 
 
 def _certificates(history: MachineHistory) -> doc.Table | None:

@@ -8,15 +8,35 @@ import numpy as np
 
 from cmm_uq.analysis.parts.budget import FAMILIES, family_of, line_in_words
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, after, commas, number, plural, say, signed
+from cmm_uq.base.messages import (
+    DASH,
+    NOTHING,
+    Number,
+    Text,
+    Verbatim,
+    after,
+    commas,
+    holding,
+    number,
+    plural,
+    say,
+    signed,
+)
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
-from cmm_uq.certificate.sections.read_axes import readings_table, recording_words, shrinking, smaller_by
-from cmm_uq.certificate.sections.regions import changes_table, resting, sizes_table
+from cmm_uq.certificate.sections.regions import (
+    changes_table,
+    readings_table,
+    recording_words,
+    resting,
+    shrinking,
+    sizes_table,
+    smaller_by,
+)
 from cmm_uq.certificate.wording import effect_title
 
 DETAILED = 10  # characteristics whose budgets are listed line by line: those of least margin
@@ -60,7 +80,6 @@ def by_family(found: PartMeasurement) -> tuple[list[str], Floats]:
 
 
 def largest_words(one: CharacteristicFigures) -> Text:
-    """The largest line of a budget, in a sentence."""
     budget = one.found.budget
     line = budget.worst(one.stated.name)
     return say("The largest part of the uncertainty of {name} comes from {cause:small} ({share} % of the variance).",
@@ -75,20 +94,17 @@ def _percent(share: float) -> Number:
 def _lines(detailed: list[CharacteristicFigures], count: int) -> Table | None:
     heads = (Column(say("No.")), say("Characteristic"), say("Cause"), Column(say("First order"), unit("%")),
              Column(say("Total"), unit("%")))  # fmt: skip
-    notes: list[Text] = [
-        say(
+    notes = holding(
+        (True, say(
             "Shares of the variance (Sobol): first order is what knowing this cause alone would take away, total what would "
             "remain if all else were known. They differ where causes do not simply add up, as in a position or a form; they "
-            "are known to about 1 %."
-        )
-    ]
-    if len(detailed) < count:
-        notes.append(after(_chosen(detailed), say("results.json has all.")))
+            "are known to about 1 %.")),
+        (len(detailed) < count, after(_chosen(detailed), say("results.json has all."))),
+    )  # fmt: skip
     return table(say("Budget by cause"), heads, (row for one in detailed for row in _budget(one)), *notes)
 
 
 def _chosen(shown: list[CharacteristicFigures]) -> Text:
-    """Which characteristics are shown of more."""
     if shown[0].found.nearest is None:
         return say("Shown are the first {count} characteristics.", count=len(shown))
     return say("Shown are the {count} characteristics with the least margin.", count=len(shown))
@@ -150,8 +166,10 @@ def unseen_section(found: PartMeasurement) -> Section:
     known = say(
         "u smaller by: what knowing this error exactly would take off u of that characteristic, 1 − √(1 − share)."
     )
-    planned = (further.text, *((say("The set-ups are planned by: {command}", command=Verbatim(further.command)),)
-                               if further.command else ())) if further else ()  # fmt: skip
+    by = NOTHING if further is None else Verbatim(further.command)
+    planned = holding(
+        (further, further.text if further else by), (by, say("The set-ups are planned by: {command}", command=by))
+    )
     return section(
         title, Paragraph(unseen_words(found), "warning"),
         table(say("Errors that are drawn as large as they may be"), heads, rows, known), *map(Paragraph, planned),
@@ -166,23 +184,16 @@ def _by_effect(unseen: Iterable[UnseenError]) -> list[list[UnseenError]]:
     return sorted((sorted(own, key=lambda one: -one.share) for own in found.values()), key=lambda own: -own[0].share)
 
 
-def _called(one: UnseenError) -> Text:
-    return say("characteristic {name}", name=Verbatim(one.characteristic))
-
-
 def _whose(own: list[UnseenError]) -> Text:
-    first = _called(own[0])
-    if len(own) == 1:
-        return first
-    return plural(len(own) - 1, one=say("{name}, and one more", name=first),
-                  many=say("{name}, and {count} more", name=first, count=len(own) - 1))  # fmt: skip
+    first, more = say("characteristic {name}", name=Verbatim(own[0].characteristic)), len(own) - 1
+    several = say("{name}, and {count} more", name=first, count=more)
+    return plural(more, one=say("{name}, and one more", name=first), many=several) if more else first
 
 
 def unseen_words(found: PartMeasurement) -> Text:
-    """The gravest of it in a sentence."""
     most = _by_effect(found.unseen)[0][0]
     return say("{share} % of the variance of {name} comes from {error:small}: {why}.", share=_percent(most.share),
-               name=_called(most), error=most.title, why=most.why)  # fmt: skip
+               name=_whose([most]), error=most.title, why=most.why)  # fmt: skip
 
 
 def ways_section(found: PartMeasurement) -> Section:
@@ -197,15 +208,13 @@ def ways_section(found: PartMeasurement) -> Section:
         (say("{way:capital}", way=way.name), *(one.small(float(way.u[one.place])) for one in shown)) for way in ways
     )
     known, zones = (number(100 * ways[-1].known(inferred=inferred), ".1g") for inferred in (False, True))
-    notes: list[Text] = [
-        say("Each way alone, by virtual measurements of its own; u is known to {known} %.", known=known)
-    ]
-    if found.measured is not None and np.any(never_negative(found.plan)[[one.place for one in shown]]):
-        notes.append(say("u of form, orientation, location and runout is known to {known} %.", known=zones))
-    if len(shown) < len(found.stated):
-        notes.append(_chosen(shown))
-    words = Paragraph(best_words(critical(found)))
-    return section(title, words, table(say("Ways to measure"), heads, rows, *notes))
+    zoned = found.measured is not None and np.any(never_negative(found.plan)[[one.place for one in shown]])
+    notes = holding(
+        (True, say("Each way alone, by virtual measurements of its own; u is known to {known} %.", known=known)),
+        (zoned, say("u of form, orientation, location and runout is known to {known} %.", known=zones)),
+        (len(shown) < len(found.stated), _chosen(shown)),
+    )
+    return section(title, Paragraph(best_words(critical(found))), table(say("Ways to measure"), heads, rows, *notes))
 
 
 def best_words(one: CharacteristicFigures) -> Text:
@@ -239,23 +248,21 @@ def priors_section(found: PartMeasurement) -> Section:
 
 
 def resting_on_priors(found: PartMeasurement) -> list[str]:
-    """Characteristics that rest on priors."""
     k = np.array([one.U / one.u if one.u else np.inf for one in found.stated])
     return [found.characteristics[i].name for i in resting(found.influence, k)]
 
 
 def priors_words(found: PartMeasurement) -> Text:
-    """What rests on priors, in a sentence."""
-    names = resting_on_priors(found)
-    if not names:
+    if not (names := resting_on_priors(found)):
         return say(
             "Where priors of the machine's errors are half as wide, or twice, no figure changes by a tenth of U."
         )
     return say(
         "{count} of {all} characteristics rest on what was taken for the machine's errors before its recording: their value "
         "or U changes by a tenth of U or more where a prior is half as wide, or twice.",
-        count=len(names), all=len(found.stated),
-    )  # fmt: skip
+        count=len(names),
+        all=len(found.stated),
+    )
 
 
 def _stated_bounds(found: PartMeasurement) -> Table | None:

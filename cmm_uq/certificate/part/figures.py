@@ -44,22 +44,13 @@ ANGLES = PrintedUnits(unit("°"), unit("″"), float(np.pi / 180), ARCSECOND)
 class CharacteristicFigures:
     """One characteristic in figures, printed to the place of its U, in its units."""
 
-    place: int  # among those of the part, from 0
     found: PartMeasurement
+    place: int  # among those of the part, from 0
+    facts: CharacteristicFacts
+    stated: StatedCharacteristic
+    judged: LimitDecision | None
 
     @property
-    def facts(self) -> CharacteristicFacts:
-        return self.found.characteristics[self.place]
-
-    @property
-    def stated(self) -> StatedCharacteristic:
-        return self.found.stated[self.place]
-
-    @property
-    def judged(self) -> LimitDecision | None:
-        return self.found.judged[self.place]
-
-    @cached_property
     def scale(self) -> PrintedUnits:
         return ANGLES if self.angular else LENGTHS
 
@@ -132,7 +123,6 @@ class CharacteristicFigures:
 
     @property
     def allowed(self) -> Text:
-        """The limits in a phrase."""
         (low, high), shown = self.limits, self.scale.value
         if low is not None and high is not None:
             return say("{low} to {high} {unit}", low=self.limit(low), high=self.limit(high), unit=shown)
@@ -143,13 +133,15 @@ class CharacteristicFigures:
     @property
     def result(self) -> Text:
         """The value with U, or the interval of a width; U alone where nothing was measured."""
-        if self.one_sided:
-            return say("{value} {unit}, 95 % interval {interval} {unit}", value=self.at(self.stated.value or 0.0),
-                       interval=self.interval, unit=self.scale.value)  # fmt: skip
         U = say("U = {U} {unit}", U=self.small(self.expanded), unit=self.scale.small)
         if self.stated.value is None:
             return U
-        return say("{value} {unit}, {U}", value=self.at(self.stated.value), unit=self.scale.value, U=U)
+        value, shown = self.at(self.stated.value), self.scale.value
+        if self.one_sided:
+            return say(
+                "{value} {unit}, 95 % interval {interval} {unit}", value=value, interval=self.interval, unit=shown
+            )
+        return say("{value} {unit}, {U}", value=value, unit=shown, U=U)
 
     @property
     def with_factor(self) -> tuple[Text, Text]:
@@ -171,9 +163,7 @@ class CharacteristicFigures:
 
     def limit(self, value: float | None) -> Text:
         """A limit or a nominal value as it was given, in mm or °."""
-        if value is None:
-            return DASH
-        return signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
+        return DASH if value is None else signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
 
     def accepted_of(self, accepted: tuple[float | None, float | None] | None) -> Text:
         """Which values a rule accepts, mm or °."""
@@ -189,15 +179,15 @@ class CharacteristicFigures:
 
 def figures_of(found: PartMeasurement) -> list[CharacteristicFigures]:
     """Every characteristic, in the order of the job."""
-    return [CharacteristicFigures(place, found) for place in range(len(found.stated))]
+    each = zip(found.characteristics, found.stated, found.judged, strict=True)
+    return [CharacteristicFigures(found, place, *one) for place, one in enumerate(each)]
 
 
 def critical(found: PartMeasurement) -> CharacteristicFigures:
     """What is told of first: the least margin; else what takes most of its tolerance; else the first."""
-    every = figures_of(found)
-    if found.nearest is not None:
-        return every[found.nearest]
-    return every[int(np.argmax([one.expanded / one.width if one.width > 0 else -1.0 for one in every]))]
+    every, nearest = figures_of(found), found.nearest
+    shares = [one.expanded / one.width if one.width > 0 else -1.0 for one in every]
+    return every[int(np.argmax(shares)) if nearest is None else nearest]
 
 
 def by_margin(found: PartMeasurement) -> list[CharacteristicFigures]:
@@ -207,7 +197,6 @@ def by_margin(found: PartMeasurement) -> list[CharacteristicFigures]:
 
 
 def part_summary(found: PartMeasurement) -> Summary:
-    """What was found, in short."""
     facts, every = found.job.facts, figures_of(found)
     return Summary(
         Verbatim(facts.part.name), day(facts.job.date), tuple(_verdicts(found, every)), tuple(map(_figure, every)),
@@ -250,19 +239,14 @@ def _figure(one: CharacteristicFigures) -> Figure:
 
 
 def _remarks(found: PartMeasurement) -> list[Text]:
-    told: list[Text] = [found.standing.path]
-    largest: dict[str, tuple[float, Text, str]] = {}
-    for one in found.unseen:
-        if one.share > largest.get(one.line, (0.0, NOTHING, ""))[0]:
-            largest[one.line] = (one.share, one.title, one.characteristic)
-    for share, title, characteristic in sorted(largest.values(), key=lambda each: -each[0])[:3]:
-        told.append(say(
-            "{share:.0f} % of the variance of {characteristic} comes from an error that the calibration did not see: {title}.",
-            share=100 * share, characteristic=Verbatim(characteristic), title=title,
-        ))  # fmt: skip
-    if found.further is not None:
-        told.append(_further(found.further))
-    return told
+    order = sorted(found.unseen, key=lambda one: -one.share)
+    largest = [next(one for one in order if one.line == line) for line in dict.fromkeys(one.line for one in order)]
+    unseen = [
+        say("{share:.0f} % of the variance of {characteristic} comes from an error that the calibration did not see: {title}.",
+            share=100 * one.share, characteristic=Verbatim(one.characteristic), title=one.title)
+        for one in largest[:3] if one.share > 0
+    ]  # fmt: skip
+    return [found.standing.path, *unseen, *([] if found.further is None else [_further(found.further)])]
 
 
 def _further(further: FurtherSetUps) -> Text:

@@ -25,9 +25,15 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.origin import NAME, FurtherCertificate, further_data
-from cmm_uq.certificate.sections.read_axes import evidence_data, readings_data, shrinking, smaller_by
-from cmm_uq.certificate.sections.regions import families_data, priors_data
+from cmm_uq.certificate.origin import NAME, FurtherCertificate, attributes, further_data, rows
+from cmm_uq.certificate.sections.regions import (
+    evidence_data,
+    families_data,
+    priors_data,
+    readings_data,
+    shrinking,
+    smaller_by,
+)
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.values import Reported
@@ -169,7 +175,6 @@ class PartMeasurement:
 
     @property
     def outcomes(self) -> list[Outcome]:
-        """Of the characteristics that were decided on."""
         return [one.outcome for one in self.judged if one is not None and one.outcome is not None]
 
     @property
@@ -192,7 +197,6 @@ _plain = str.__str__
 
 
 def part_results(found: PartMeasurement) -> dict[str, Any]:
-    """Contents of ``results.json``."""
     simulated, facts, further, job = found.simulated, found.job.facts, found.further, found.job.facts.job
     names, shares = [one.name for one in found.characteristics], found.budget
     stated = [_characteristic(found, i) for i in range(len(names))]
@@ -235,23 +239,17 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         "verdicts": Verdicts.of_results({"characteristics": stated}).data(),
         "budget": {
             "characteristics": list(shares.characteristics),
-            "causes": [
-                {"cause": name, "first": first, "total": total}
-                for name, first, total in zip(shares.causes, shares.first.tolist(), shares.total.tolist(), strict=True)
-            ],
-            "factors": [
-                {"factor": name, "share": part} for name, part in zip(shares.factors, shares.within.tolist(), strict=True)
-            ],
+            "causes": rows(cause=shares.causes, first=shares.first.tolist(), total=shares.total.tolist()),
+            "factors": rows(factor=shares.factors, share=shares.within.tolist()),
         },
         "unseen": [
-            {"characteristic": one.characteristic, "effect": one.effect or None, "line": one.line, "title": _plain(one.title),
-             "share": one.share, "why": _plain(one.why), "u_smaller_by": smaller_by(one.share),
+            {"characteristic": one.characteristic, "effect": one.effect or None,
+             **attributes(one, "line", "title", "share", "why"), "u_smaller_by": smaller_by(one.share),
              "shown_or_bounded_by": _plain(shrinking(one.effect, found.given.machine.machine)) or None}
             for one in found.unseen
         ],
         "priors": priors_data(found.influence),
-        "further": further and {
-            "effects": list(further.effects), "setups": further.setups, "text": _plain(further.text),
+        "further": further and attributes(further, "effects", "setups", "text") | {
             "command": further.command or None, "file": further.file or None, "missed": list(further.missed),
         },
         "ways": [
@@ -277,9 +275,8 @@ def unit_of(one: CharacteristicFacts) -> str:
 
 
 def standing_data(one: CertificateStatus) -> dict[str, Any]:
-    """The machine's certificate."""
     return {
-        "source": one.source, "files": list(one.files), "number": one.number or None, "laboratory": one.laboratory or None,
+        **attributes(one, "source", "files"), "number": one.number or None, "laboratory": one.laboratory or None,
         "machine": one.machine, "serial": one.serial or None, "origin": one.origin, "date": one.date.isoformat(),
         "age_days": one.age.days, "valid_until": None if one.valid_until is None else one.valid_until.isoformat(),
         "verdict": one.verdict,
@@ -287,9 +284,7 @@ def standing_data(one: CertificateStatus) -> dict[str, Any]:
         "not_checked": [{"what": each.what, "why": each.why} for each in one.checked if each.why],
         "computed_again": one.again, "signatures_held_to_trusted": one.trusted, "draft": one.draft,
         "given_recording": one.given_recording, "drawn": _plain(one.path), "drift": _plain(one.drift),
-        "changes": None if one.changes is None else [
-            {"parameter": name, "change": change} for name, change in one.changes.items()
-        ],
+        "changes": None if one.changes is None else rows(parameter=one.changes, change=one.changes.values()),
         "temperature_c": one.temperature_c, "inputs_sha256": dict(one.inputs_sha256),
         **further_data(one.further),
     }  # fmt: skip
@@ -322,7 +317,6 @@ def _characteristic(found: PartMeasurement, i: int) -> dict[str, Any]:
 
 
 def _in(one: CharacteristicFacts, value: float) -> float:
-    """A value of a characteristic in its unit."""
     return degrees(value) if one.asks.limits == "angles" else value
 
 

@@ -15,9 +15,10 @@ from cmm_uq.analysis.parts.methods import method as other_methods
 from cmm_uq.analysis.parts.methods.of_job import METHODS
 from cmm_uq.analysis.parts.virtual import AGREES, CHECKED
 from cmm_uq.base import messages
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, holding, number, plural, say
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
-from cmm_uq.certificate.document import Column, Facts, Paragraph, Section, Table, columns, section, table
+from cmm_uq.certificate import document
+from cmm_uq.certificate.document import Column, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.origin import NAME, further_table
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
@@ -26,22 +27,16 @@ from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 
 def method_section(found: PartMeasurement) -> Section:
-    """What was drawn, how often, and how to do it again."""
     simulated = found.simulated
-    rows = (
+    facts = document.facts(
         (say("Virtual measurements"), number(simulated.trials)),
-        (say("Places of the part"), number(len(found.virtual.places))),
-        (say("Drawn together"), _drawn(found)),
-        (say("Temperatures"), _temperatures(found)),
-        (say("Evaluated"), _evaluated(found)),
+        (say("Places of the part"), number(len(found.virtual.places))), (say("Drawn together"), _drawn(found)),
+        (say("Temperatures"), _temperatures(found)), (say("Evaluated"), _evaluated(found)),
         (say("Figures"), _stable(found)),
         (say("Coverage probability of intervals"), say("{coverage:g} %", coverage=100 * simulated.coverage)),
-        (say("Seed"), number(found.seed)),
-        (say("Program"), program_words()),
-        (say("To do it again"), again(found)),
-    )
-    paragraphs = [Paragraph(text) for text in (_METHOD, *_STANDARDS)]
-    return Section(say("Method"), (paragraphs[0], Facts(tuple(row for row in rows if row[1])), *paragraphs[1:]))
+        (say("Seed"), number(found.seed)), (say("Program"), program_words()), (say("To do it again"), again(found)),
+    )  # fmt: skip
+    return section(say("Method"), Paragraph(_METHOD), facts, *map(Paragraph, _STANDARDS))
 
 
 _METHOD = say(
@@ -80,10 +75,8 @@ def _drawn(found: PartMeasurement) -> Text:
 
 def _temperatures(found: PartMeasurement) -> Text:
     given = found.job.facts.environment
-    x, y, z = (messages.signed(each, "g") for each in given.scales_c)
-    told = say(
-        "part {part} °C, scales of x, y, z {x}, {y}, {z} °C", part=messages.signed(given.part_c, "g"), x=x, y=y, z=z
-    )
+    part, x, y, z = (messages.signed(each, "g") for each in (given.part_c, *given.scales_c))
+    told = say("part {part} °C, scales of x, y, z {x}, {y}, {z} °C", part=part, x=x, y=y, z=z)
     if given.compensated:
         return say("{told}; lengths are computed at 20 °C", told=told)
     return say("{told}; lengths are not corrected to 20 °C", told=told)
@@ -95,9 +88,10 @@ def _evaluated(found: PartMeasurement) -> Text:
     return say(
         "least-squares features by the derivative of their fit, all else on the points of every draw; {checked} draws "
         "evaluated on all points differ by {off} of u, less than {limit:g} %",
-        checked=CHECKED, off=say("{off} %", off=number(100 * float(found.virtual.off.max(initial=0.0)), ".2g")),
+        checked=CHECKED,
+        off=say("{off} %", off=number(100 * float(found.virtual.off.max(initial=0.0)), ".2g")),
         limit=100 * AGREES,
-    )  # fmt: skip
+    )
 
 
 def _stable(found: PartMeasurement) -> Text:
@@ -124,7 +118,7 @@ def again(found: PartMeasurement) -> Text:
 def not_covered_section(found: PartMeasurement) -> Section:
     """What must not be read out of the figures: left out of this job, then of every one."""
     left, lacking, unstated = found.job.facts.part.not_measured, found.virtual.places[0].lacking, _unstated(found)
-    told = (
+    return section(say("What is not covered"), *map(Paragraph, holding(
         (left, say("Of the drawing, these are not measured here: {names}.", names=messages.commas(messages.names(left)))),
         (lacking, say("Of the machine's errors, these could not be drawn, for lack of what they depend on: {names}.",
                       names=messages.commas(titles(sorted(lacking))))),
@@ -139,8 +133,7 @@ def not_covered_section(found: PartMeasurement) -> Section:
         (True, say(
             "Tried on simulated machines whose scales err as much as physics allows, by any period: 95 % intervals hold the "
             "truth in 94 to 96 of 100 cases.")),
-    )  # fmt: skip
-    return section(say("What is not covered"), *(Paragraph(text) for holds, text in told if holds))
+    )))  # fmt: skip
 
 
 def _unstated(found: PartMeasurement) -> list[Text]:
@@ -148,12 +141,12 @@ def _unstated(found: PartMeasurement) -> list[Text]:
     each, room = facts.characteristic, facts.environment
     operators = facts.probing.u_operator_um or any(one.u_operator_um or one.u_operator_deg for one in each)
     styli = any(one.u_diameter_um or one.lobing_um or any(one.u_offset_um) for one in facts.stylus)
-    stated = (
-        (styli, say("qualification of the styli")), (room.u_part_k or room.u_scales_k, say("temperatures")),
-        (facts.part.u_cte_per_k, say("expansion of the part")), (found.given.forms, say("form and roughness of the part")),
-        (facts.placing.u_fixture_um, say("clamping")), (operators, say("operators")),
+    return holding(
+        (not styli, say("qualification of the styli")), (not (room.u_part_k or room.u_scales_k), say("temperatures")),
+        (not facts.part.u_cte_per_k, say("expansion of the part")),
+        (not found.given.forms, say("form and roughness of the part")),
+        (not facts.placing.u_fixture_um, say("clamping")), (not operators, say("operators")),
     )  # fmt: skip
-    return [what for given, what in stated if not given]
 
 
 def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
@@ -161,13 +154,12 @@ def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
     facts, room = found.job.facts, found.job.facts.environment
     touching = any(one.diameter_mm and not (one.u_diameter_um or one.lobing_um) for one in facts.stylus)
     cold = room.part_c == REFERENCE_TEMPERATURE
-    left_out = (
+    without = holding(
         (touching, say("qualification of the styli")),
         (not room.u_part_k, say("temperatures")),
         (not (facts.part.cte_per_k and (facts.part.u_cte_per_k or cold)), say("expansion of the part")),
         (not found.given.forms, say("form and roughness of the part")),
     )
-    without = [what for holds, what in left_out if holds]
     if found.measured is None or not without or not any(found.judged):
         return ()
     what = messages.listed(without)
@@ -282,7 +274,6 @@ def _conditions(methods: Sequence[other_methods.MethodResult]) -> Table:
 
 
 def _budgets(method: other_methods.MethodResult, told: Sequence[str]) -> Table:
-    """Budgets of some characteristics line by line."""
     heads = columns((say("Characteristic"), say("Contribution"), say("u, its part"), Column(say("ν")),
                      Column(say("Share"), unit("%"))))  # fmt: skip
     rows = tuple(row for name in told if (one := method.of(name)) is not None for row in _lines(one))
@@ -336,17 +327,13 @@ def machine_section(found: PartMeasurement) -> Section:
     standing, celsius = found.standing, NOTHING
     if standing.temperature_c is not None:
         celsius = say("{value} °C", value=messages.number(standing.temperature_c, ".2f"))
-    rows = (
-        (say("Taken from"), _SOURCES[standing.source]),
-        *certificate_rows(standing),
-        (say("Files"), commas(messages.names(standing.files))),
-        (say("Verified"), verified_words(standing)),
+    facts = document.facts(
+        (say("Taken from"), _SOURCES[standing.source]), *certificate_rows(standing),
+        (say("Files"), commas(messages.names(standing.files))), (say("Verified"), verified_words(standing)),
         (say("Signatures"), say("by trusted certificates") if standing.trusted else say("not asked for")),
-        (say("Temperature of the scales at the calibration"), celsius),
-        (say("Noise of a coordinate"), _noise(found)),
-    )
+        (say("Temperature of the scales at the calibration"), celsius), (say("Noise of a coordinate"), _noise(found)),
+    )  # fmt: skip
     told = (Paragraph(text) for text in (standing.path, standing.drift) if text)
-    facts = Facts(tuple(row for row in rows if row[1]))
     return section(say("The machine and its certificate"), facts, *told, further_table(standing.further))
 
 
@@ -357,10 +344,9 @@ def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ..
     if standing.draft:
         number_of = say("{number}, a draft", number=number_of)
     days, date = standing.age.days, messages.day(standing.date)
-    calibrated = say("{date}, the day of the measurement", date=date)
-    if days:
-        age = plural(days, one=say("one day"), many=say("{count} days", count=days))
-        calibrated = say("{date}, {age} before", date=date, age=age)
+    age = plural(days, one=say("one day"), many=say("{count} days", count=days))
+    on_the_day = say("{date}, the day of the measurement", date=date)
+    calibrated = say("{date}, {age} before", date=date, age=age) if days else on_the_day
     return (
         (say("Machine"), commas(text for text in (Verbatim(standing.machine), serial) if text)),
         (say("Certificate of the machine"), number_of),
@@ -371,7 +357,6 @@ def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ..
 
 
 def verified_words(standing: CertificateStatus) -> Text:
-    """What was compared and what was not."""
     done = [one for one in standing.checked if one.count]
     if not done:
         return say("no: analysed anew") if standing.source == "job" else say("no")

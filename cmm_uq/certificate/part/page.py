@@ -9,10 +9,10 @@ import numpy as np
 from cmm_uq.analysis.conformity.decision import Outcome
 from cmm_uq.analysis.parts.budget import ASSOCIATIONS, KINDS
 from cmm_uq.analysis.parts.evaluation import characteristics_of
-from cmm_uq.analysis.parts.plan import Plan, Stylus
+from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import deviations_of
 from cmm_uq.base import messages
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, holding, number, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import certificate, document as doc
@@ -31,7 +31,7 @@ from cmm_uq.maths.uncertainty.quantity import nominal
 
 def overview_of(found: PartMeasurement) -> doc.Overview:
     one = critical(found)
-    rows = (
+    facts = doc.facts(
         (say("Part"), part_words(found)),
         (say("Decision rule"), found.judged_by if any(found.judged) else NOTHING),
         (say("Least margin") if found.nearest is not None else say("Tightest"), _least(one)),
@@ -44,7 +44,7 @@ def overview_of(found: PartMeasurement) -> doc.Overview:
     return doc.Overview(
         verdict_words(found.outcomes, measured=found.measured is not None),
         "unknown" if found.outcome is None else standing_of(found.outcome),
-        tuple(row for row in rows if row[1]),
+        facts.rows,
     )
 
 
@@ -72,9 +72,10 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
         return say("Conditionally accepted: all values are within their limits, not all with their uncertainty")
     open_ = sum(one == "undecided" for one in outcomes)
     return plural(
-        open_, one=say("Undecided: one of {all} characteristics is too near to a limit", all=all_),
+        open_,
+        one=say("Undecided: one of {all} characteristics is too near to a limit", all=all_),
         many=say("Undecided: {count} of {all} characteristics are too near to a limit", count=open_, all=all_),
-    )  # fmt: skip
+    )
 
 
 def part_words(found: PartMeasurement) -> Text:
@@ -107,11 +108,10 @@ def _together(found: PartMeasurement) -> Text:
 
 def _not_covered(found: PartMeasurement) -> Text:
     left, free = found.job.facts.part.not_measured, [one.titled for one in figures_of(found) if one.judged is None]
-    told = (
+    return messages.sentences(holding(
         (left, say("Not measured: {names}.", names=commas(messages.names(left)))),
         (0 < len(free) < len(found.judged), say("Without limits: {names}.", names=messages.semicolons(free))),
-    )
-    return messages.sentences([text for holds, text in told if holds])
+    ))  # fmt: skip
 
 
 TITLE = say("Measurement report")
@@ -170,10 +170,8 @@ def _particulars(found: PartMeasurement) -> tuple[doc.Facts, ...]:
 
 def results_section(found: PartMeasurement) -> Section:
     """Every characteristic with its value, if anything was measured, and its uncertainty."""
-    measured = found.measured is not None
-    tables = (
-        _table(part, measured=measured, reported=found.job.reported is not None) for part in _parts(figures_of(found))
-    )
+    measured, reported = found.measured is not None, found.job.reported is not None
+    tables = (_table(part, measured=measured, reported=reported) for part in _parts(figures_of(found)))
     return section(say("Results"), None if measured else Paragraph(_UNMEASURED), *tables)
 
 
@@ -200,7 +198,7 @@ def _table(every: Sequence[CharacteristicFigures], *, measured: bool, reported: 
          *one.with_factor, one.interval, *(() if measured else (one.error(one.stated.error),)))
         for one in every
     )  # fmt: skip
-    notes = (
+    notes = holding(
         (True, say(
             "95 % interval: the shortest that holds 95 % of the virtual measurements. U = k · u is half of it, u the standard "
             "uncertainty; the value lies in the middle only where errors to both sides are alike.")),
@@ -213,8 +211,7 @@ def _table(every: Sequence[CharacteristicFigures], *, measured: bool, reported: 
         (True, say("All other values are stated less the mean of their errors.") if every[0].stated.value is not None else
          say("The interval is that of the true value less the indicated one.")),
     )  # fmt: skip
-    caption = say("Angles") if every[0].angular else say("Lengths, forms and places")
-    return table(caption, heads, rows, *(text for holds, text in notes if holds))
+    return table(say("Angles") if every[0].angular else say("Lengths, forms and places"), heads, rows, *notes)
 
 
 def conformity_section(found: PartMeasurement) -> Section:
@@ -224,10 +221,11 @@ def conformity_section(found: PartMeasurement) -> Section:
         return section(say("Conformity"))
     nominal, measured = characteristics_of(found.plan, found.plan.points).tolist(), found.measured is not None
     return section(
-        say("Conformity with the drawing"), Paragraph(_rule(found, limited)),
+        say("Conformity with the drawing"),
+        Paragraph(_rule(found, limited)),
         *margin_plots([_margin(one) for one in limited if measured or one.width > 0]),
         *(_decisions(part, nominal, measured=measured) for part in _parts(limited)),
-    )  # fmt: skip
+    )
 
 
 def _rule(found: PartMeasurement, limited: Sequence[CharacteristicFigures]) -> Text:
@@ -247,7 +245,7 @@ def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float],
         Column(say("Upper limit"), value), Column(say("Accepted"), value, numeric=False),
         *((say("Decision"), say("P")) if measured else ()),
     )  # fmt: skip
-    notes = (
+    notes = holding(
         (True, say("Accepted: values that the rule accepts with this uncertainty.")),
         (measured, say("P: probability that the true value is within its limits, by the virtual measurements.")),
         (any(one.judged is not None and one.judged.accepted is None for one in every),
@@ -257,8 +255,7 @@ def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float],
         caption = say("Decisions on angles") if every[0].angular else say("Decisions")
     else:
         caption = say("Angles that the rule will accept") if every[0].angular else say("What the rule will accept")
-    rows = (_decision(one, nominal[one.place], measured=measured) for one in every)
-    return table(caption, heads, rows, *(text for holds, text in notes if holds))
+    return table(caption, heads, (_decision(one, nominal[one.place], measured=measured) for one in every), *notes)
 
 
 def _decision(one: CharacteristicFigures, nominal: float, *, measured: bool) -> tuple[Text, ...]:
@@ -308,31 +305,28 @@ def part_section(found: PartMeasurement) -> Section:
     note = say("Association: how a feature is made of its points, where a characteristic says nothing else.")
     return section(
         say("The part as it is probed"), part_picture(plan, found.given.poses[0], lettered_names(plan)),
-        table(say("Features"), heads, rows, note), doc.Facts(tuple(row for row in _lies(found) if row[1])),
+        table(say("Features"), heads, rows, note), _lies(found),
     )  # fmt: skip
 
 
-def _lies(found: PartMeasurement) -> list[tuple[Text, Text]]:
-    facts, given = found.job.facts, found.job.facts.placing
-    varied = len(found.given.poses)
+def _lies(found: PartMeasurement) -> doc.Facts:
+    facts, varied = found.job.facts, len(found.given.poses)
     placed = say("origin at {origin} mm, turned by {angles}° about x, y, z of the machine",
-                 origin=_three(found.origin_mm), angles=_three(given.rotation_deg))  # fmt: skip
+                 origin=_three(found.origin_mm), angles=_three(facts.placing.rotation_deg))  # fmt: skip
     if varied > 1:
         placed = say("{placed}; drawn in {count} places about it", placed=placed, count=varied)
     datums = commas(messages.names(facts.alignment.datums))
-    alignment = say("best fit of all points") if facts.alignment.best_fit else datums
-    repeats = facts.probing.repeats
-    return [
+    styli = messages.semicolons(
+        say("{name}: tip of {diameter} mm, offset {offset} mm", name=Verbatim(one.name), diameter=nominal(one.diameter_mm),
+            offset=_three(one.offset_mm.tolist()))
+        for one in found.plan.styli
+    )  # fmt: skip
+    return doc.facts(
         (say("Place in the machine"), placed),
-        (say("Alignment"), alignment),
-        (say("Styli"), messages.semicolons(_stylus(one) for one in found.plan.styli)),
-        (say("Repeats of each point"), number(repeats) if repeats > 1 else NOTHING),
-    ]
-
-
-def _stylus(one: Stylus) -> Text:
-    return say("{name}: tip of {diameter} mm, offset {offset} mm", name=Verbatim(one.name), diameter=nominal(one.diameter_mm),
-               offset=_three(one.offset_mm.tolist()))  # fmt: skip
+        (say("Alignment"), say("best fit of all points") if facts.alignment.best_fit else datums),
+        (say("Styli"), styli),
+        (say("Repeats of each point"), number(facts.probing.repeats) if facts.probing.repeats > 1 else NOTHING),
+    )
 
 
 def _three(values: Sequence[float]) -> Text:

@@ -164,7 +164,6 @@ _NORMAL, _STEM = 0.05, 0.22  # of the largest span: how long a normal is drawn, 
 
 
 def part_picture(plan: Plan, pose: PartPose, names: Sequence[Text]) -> Plot:
-    """Four views of the part with all of its points."""
     points, normals = plan.points, plan.normals
     largest = span_of(plan)
     tips, roots = _stems(plan, pose, largest)
@@ -176,8 +175,9 @@ def part_picture(plan: Plan, pose: PartPose, names: Sequence[Text]) -> Plot:
             say("The part as it is probed, {count}: dots are points with their normals.", count=count),
             say("Brown lines are styli.") if np.any(tips != roots) else NOTHING,
         ),
-        len(rows), len(points),
-    )  # fmt: skip
+        len(rows),
+        len(points),
+    )
     with style.house_style():
         figure, seen = panels(everything, 0.05, 0.0)
         size = float(np.clip(30 / np.sqrt(len(rows)), 1.4, 3.4))
@@ -194,21 +194,21 @@ def part_picture(plan: Plan, pose: PartPose, names: Sequence[Text]) -> Plot:
         )
         alternative = say(
             "The part from above, from the front, from the right and obliquely: {features} with {points}.",
-            features=features, points=count,
-        )  # fmt: skip
+            features=features,
+            points=count,
+        )
         return style.drawn(figure, caption, alternative, "part")
 
 
 def _stems(plan: Plan, pose: PartPose, largest: float) -> tuple[Floats, Floats]:
     """(f, 3) of each feature: the tip's centre at its first point, and where the stylus is cut off."""
-    tips, roots = [], []
+    tips, roots, styli = [], [], {one.name: one for one in plan.styli}
     for feature in plan.features:
-        stylus = next(one for one in plan.styli if one.name == feature.stylus)
-        tip = feature.points[0] + 0.5 * stylus.diameter_mm * feature.normals[0]
+        stylus = styli[feature.stylus]
         up = -pose.back(np.asarray(stylus.offset_mm, dtype=np.float64))
         length = float(np.linalg.norm(up))
-        tips.append(tip)
-        roots.append(tip + up * min(1.0, _STEM * largest / length) if length else tip)
+        tips.append(feature.points[0] + 0.5 * stylus.diameter_mm * feature.normals[0])
+        roots.append(tips[-1] + up * min(1.0, _STEM * largest / length) if length else tips[-1])
     return np.array(tips), np.array(roots)
 
 
@@ -251,8 +251,9 @@ def errors_picture(plan: Plan, errors: PointErrors) -> Plot:
         alternative = say(
             "The part in four views with errors of its points: mean errors of up to {mean} µm, standard "
             "uncertainties of up to {u} µm.",
-            mean=significant(float(size.max(initial=0.0))), u=significant(float(u.max(initial=0.0))),
-        )  # fmt: skip
+            mean=significant(float(size.max(initial=0.0))),
+            u=significant(float(u.max(initial=0.0))),
+        )
         return style.drawn(figure, caption, alternative, "errors")
 
 
@@ -285,13 +286,13 @@ def form_picture(plan: Plan, deviations: Floats) -> Plot:
         )  # fmt: skip
         alternative = say(
             "The part in four views with the distances of its measured points from their features: {low} to {high} µm.",
-            low=signed(float(sizes.min(initial=0.0)), ".1f"), high=signed(float(sizes.max(initial=0.0)), ".1f"),
-        )  # fmt: skip
+            low=signed(float(sizes.min(initial=0.0)), ".1f"),
+            high=signed(float(sizes.max(initial=0.0)), ".1f"),
+        )
         return style.drawn(figure, caption, alternative, "form")
 
 
 def _all(plan: Plan, ends: Floats, radius: Floats) -> Floats:
-    """Corners of all that is drawn."""
     reach = float(radius.max(initial=0.0))
     return np.vstack([plan.points, ends, ends + reach, ends - reach])
 

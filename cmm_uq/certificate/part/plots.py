@@ -69,12 +69,19 @@ def margin_plots(rows: Sequence[Margin]) -> list[Plot]:
 
 
 def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> Plot:
-    height = 17.0 + 5.2 * len(rows)
+    height, count = 17.0 + 5.2 * len(rows), len(rows)
     means = say("bar: 95 % interval about the middle, since nothing was measured; dark: what is accepted")
-    caption = say("How much of the tolerance the uncertainty takes.")
-    if measured := any(row.outcome is not None for row in rows):
+    caption: Text = say("How much of the tolerance the uncertainty takes.")
+    share = max((row.interval[1] - row.interval[0]) / row.scale[1] for row in rows)
+    told = say("{count} characteristics; the 95 % interval takes up to {share} % of what is allowed.", count=count,
+               share=number(100 * share, ".0f"))  # fmt: skip
+    if any(row.outcome is not None for row in rows):
         means = say("full dot: conforms, cross: does not, hollow dot: undecided; dark: what is accepted")
         caption = say("The characteristics between their limits, with their 95 % intervals.")
+        inside = sum(row.outcome in ("pass", "conditional pass") for row in rows)
+        out = sum(row.outcome in ("fail", "conditional fail") for row in rows)
+        told = say("{count} characteristics against their limits: {inside} conform, {out} do not, {rest} are undecided.",
+                   count=count, inside=inside, out=out, rest=count - inside - out)  # fmt: skip
     if part:
         caption = say("{caption} Part {number} of {count}.", caption=caption, number=part[0], count=part[1])
     with style.picture(height, left=0.34, right=0.985, bottom=12 / height, top=1 - 1.5 / height) as (figure, ax):
@@ -85,18 +92,7 @@ def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> 
         ax.set_xticks([0.0, 0.5, 1.0], [say("lower limit"), say("middle"), say("upper limit")])
         ax.set(xlim=(-_FARTHEST, 1 + _FARTHEST), ylim=(len(rows) - 0.4, -0.6))
         ax.set_xlabel(means, loc="right")  # towards the names: in some languages it is longer than the axis
-        return style.drawn(figure, caption, _told(rows, measured=measured), "limits")
-
-
-def _told(rows: Sequence[Margin], *, measured: bool) -> Text:
-    if not measured:
-        share = max((row.interval[1] - row.interval[0]) / row.scale[1] for row in rows)
-        return say("{count} characteristics; the 95 % interval takes up to {share} % of what is allowed.",
-                   count=len(rows), share=number(100 * share, ".0f"))  # fmt: skip
-    inside = sum(row.outcome in ("pass", "conditional pass") for row in rows)
-    out = sum(row.outcome in ("fail", "conditional fail") for row in rows)
-    return say("{count} characteristics against their limits: {inside} conform, {out} do not, {rest} are undecided.",
-               count=len(rows), inside=inside, out=out, rest=len(rows) - inside - out)  # fmt: skip
+        return style.drawn(figure, caption, told, "limits")
 
 
 def _band(ax: Axes, place: int, row: Margin) -> None:
@@ -187,18 +183,15 @@ def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot
             for g, left in members:
                 figure.text(left / style.WIDTH_MM, y, "■", fontsize=8, color=_SHADES[g % len(_SHADES)], va="center")
                 figure.text((left + 3.6) / style.WIDTH_MM, y, causes[g], fontsize=style.TINY, va="center")
-        return style.drawn(
-            figure,
-            say("What the variance of each characteristic is made of, %, by cause: total shares over their sum."),
-            semicolons(_told_of_budget_plot(name, causes, shares[:, i]) for i, name in enumerate(names)),
-            "budget",
-        )
-
-
-def _told_of_budget_plot(name: Text, causes: Sequence[Text], shares: Floats) -> Text:
-    order = [int(g) for g in np.argsort(-shares, kind="stable")[:3] if shares[g] > 0]
-    said = commas(say("{what:small} {share} %", what=causes[g], share=number(100 * shares[g], ".0f")) for g in order)
-    return say("{name}: {shares}", name=name, shares=said)
+        largest = [[int(g) for g in np.argsort(-own, kind="stable")[:3] if own[g] > 0] for own in shares.T]
+        told = semicolons(
+            say("{name}: {shares}", name=name, shares=commas(
+                say("{what:small} {share} %", what=causes[g], share=number(100 * shares[g, i], ".0f")) for g in largest[i]
+            ))
+            for i, name in enumerate(names)
+        )  # fmt: skip
+        caption = say("What the variance of each characteristic is made of, %, by cause: total shares over their sum.")
+        return style.drawn(figure, caption, told, "budget")
 
 
 def _legend_lines(causes: Sequence[Text]) -> list[list[tuple[int, float]]]:
@@ -249,22 +242,14 @@ def correlation_plot(numbers: Sequence[Text], correlation: Floats) -> Plot:
         ax.set_yticks(range(count), numbers, fontsize=style.TINY)
         ax.tick_params(length=0, labelcolor=style.INK)
         ax.spines[["left", "bottom"]].set_color(style.RULE)
-        return style.drawn(
-            figure,
-            say("Correlations between the characteristics, by their numbers: full dots positive, hollow dots negative, the "
-                "larger the stronger; those below {least:g} in size are left out.", least=LEAST),
-            _told_of_correlation_plot(numbers, sizes, below, left),
-            "correlation",
-        )  # fmt: skip
-
-
-def _told_of_correlation_plot(numbers: Sequence[Text], sizes: Floats, below: np.ndarray, left: np.ndarray) -> Text:
-    most = int(np.abs(sizes).argmax())
-    return say(
-        "{count} of {all} correlations are {least:g} or larger in size; the largest, {r}, is between {one} and {other}.",
-        count=int((np.abs(sizes) >= LEAST).sum()), all=len(sizes), least=LEAST, r=signed(float(sizes[most]), ".2f"),
-        one=numbers[int(left[most])], other=numbers[int(below[most])],
-    )  # fmt: skip
+        most = int(np.abs(sizes).argmax())
+        caption = say("Correlations between the characteristics, by their numbers: full dots positive, hollow dots negative, "
+                      "the larger the stronger; those below {least:g} in size are left out.", least=LEAST)  # fmt: skip
+        return style.drawn(figure, caption, say(
+            "{count} of {all} correlations are {least:g} or larger in size; the largest, {r}, is between {one} and {other}.",
+            count=int((np.abs(sizes) >= LEAST).sum()), all=len(sizes), least=LEAST, r=signed(float(sizes[most]), ".2f"),
+            one=numbers[int(left[most])], other=numbers[int(below[most])],
+        ), "correlation")  # fmt: skip
 
 
 FEW = 8  # characteristics up to which their correlations are a table
@@ -281,17 +266,10 @@ def correlation_section(found: PartMeasurement) -> Section:
     )  # fmt: skip
     if len(every) > FEW:
         return section(title, told, correlation_plot([one.number for one in every], found.correlation))
-    rows = (
-        (one.number, one.beside, *(_r(float(found.correlation[one.place, j]), one.place, j) for j in range(len(every))))
-        for one in every
-    )
+    # of a matrix that is the same below and above its diagonal, the lower half
+    lower = [[DASH if j > i else number(1) if j == i else signed(round(float(found.correlation[i, j]), 2) + 0.0, ".2f")
+              for j in range(len(every))] for i in range(len(every))]  # fmt: skip
+    rows = ((one.number, one.beside, *lower[one.place]) for one in every)
     numbers = (Column(say("No. {number}", number=one.number)) for one in every)
     heads: tuple[Text | Column, ...] = (Column(say("No.")), say("Characteristic"), *numbers)
     return section(title, told, table(say("Correlations between the characteristics"), heads, rows))
-
-
-def _r(value: float, row: int, column: int) -> Text:
-    """Of a matrix that is the same below and above its diagonal, the lower half."""
-    if column > row:
-        return DASH
-    return number(1) if column == row else signed(round(value, 2) + 0.0, ".2f")

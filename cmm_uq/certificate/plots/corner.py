@@ -54,7 +54,9 @@ def corner_plot(
     if units:
         labels = [say("{name} / {unit}", name=names[c], unit=units[c]) if units[c] else names[c] for c in chosen]
     with style.house_style():
-        panels = _Panels(_ranges(kept), kept)
+        low, high = np.quantile(kept, [0.0015, 0.9985], axis=0)
+        room = np.where(high > low, (high - low) / 16, np.maximum(np.abs(high), 1.0) * 1e-6)  # never empty
+        panels = _Panels(np.column_stack([low - room, high + room]).astype(np.float64), kept)
         panels.densities(middle[chosen], between[chosen])
         panels.pairs(middle[chosen])
         panels.frames()
@@ -72,13 +74,6 @@ def _most_correlated(draws: Floats) -> NDArray[np.intp]:
     return np.sort(np.argsort(-correlation.max(axis=0), kind="stable")[:READABLE])
 
 
-def _ranges(draws: Floats) -> Floats:
-    """(d, 2) from the 0.15 to the 99.85 % quantile, widened by a sixteenth; never empty."""
-    low, high = np.quantile(draws, [0.0015, 0.9985], axis=0)
-    room = np.where(high > low, (high - low) / 16, np.maximum(np.abs(high), 1.0) * 1e-6)
-    return np.column_stack([low - room, high + room]).astype(np.float64)
-
-
 def _smooth(counts: Floats) -> Floats:
     """Counts along one or two axes smoothed by a Gaussian that is wider the fewer they are (Scott's n^(−1/6))."""
     index = np.arange(_BINS)
@@ -87,13 +82,6 @@ def _smooth(counts: Floats) -> Floats:
     kernel /= kernel.sum(axis=0)
     smoothed: Floats = kernel @ counts
     return smoothed if counts.ndim == 1 else smoothed @ kernel.T
-
-
-def _levels(density: Floats) -> list[float]:
-    """Heights whose contours hold 95 % and 50 % of the probability."""
-    descending = np.sort(density.ravel())[::-1]
-    mass = np.cumsum(descending) / descending.sum()
-    return [float(descending[min(np.searchsorted(mass, inside), mass.size - 1)]) for inside in _MASSES]
 
 
 class _Panels:
@@ -158,9 +146,14 @@ class _Panels:
             good = (i >= 0) & (j >= 0)
             counts = np.bincount(i[good] * _BINS + j[good], minlength=_BINS**2).reshape(_BINS, _BINS)
             density = _smooth(counts.astype(np.float64))
-            lines = contour_generator(column + centres, self.count - 1 - row + centres, density,
-                                      fill_type=FillType.OuterCode)  # fmt: skip
-            for level, paths in zip(_levels(density), areas, strict=True):
+            lines = contour_generator(
+                column + centres, self.count - 1 - row + centres, density, fill_type=FillType.OuterCode
+            )
+            descending = np.sort(density.ravel())[::-1]
+            mass = np.cumsum(descending) / descending.sum()
+            # heights whose contours hold 95 % and 50 % of the probability
+            heights = [float(descending[min(np.searchsorted(mass, inside), mass.size - 1)]) for inside in _MASSES]
+            for level, paths in zip(heights, areas, strict=True):
                 paths.extend(Path(*outline) for outline in zip(*lines.filled(level, np.inf), strict=True))
         for paths, alpha in zip(areas, (0.16, 0.34), strict=True):
             if paths:
@@ -187,8 +180,9 @@ class _Panels:
             if k:
                 self.strokes(edge, edge - length, y, y, MUTED)
             for place, text in zip(x, texts, strict=True):
-                self.ax.text(place, -distance, text, ha="right", va="top", rotation=_SLANT, rotation_mode="anchor",
-                             fontsize=TINY)  # fmt: skip
+                self.ax.text(
+                    place, -distance, text, ha="right", va="top", rotation=_SLANT, rotation_mode="anchor", fontsize=TINY
+                )
             for place, text in zip(y if k else (), texts, strict=bool(k)):
                 self.ax.text(-distance, place, text, ha="right", va="center", fontsize=TINY)
             size = SMALL if self.count <= 8 else TINY

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, say, semicolons, signed
+from cmm_uq.base.messages import NOTHING, Text, holding, say, semicolons, signed
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.document import Plot
@@ -205,29 +205,16 @@ def readings_plot(
     residuals = result.residuals / MICROMETRE
     what = say("{count} readings: as recorded they deviate", count=len(off_um))
     return length_plot(
-        result.artefact.measurement.astype(float),
-        off_um,
-        residuals,
-        expanded_before_um=result.noise.expanded * scale,
-        reference=reference,
-        flagged=result.flagged,
-        position_label=say("Measurement"),
-        caption=caption,
+        result.artefact.measurement.astype(float), off_um, residuals, expanded_before_um=result.noise.expanded * scale,
+        reference=reference, flagged=result.flagged, position_label=say("Measurement"), caption=caption,
         alternative=deviating(what, from_reference, off_um, residuals),
-    )
+    )  # fmt: skip
 
 
 def positioning_plot(
-    targets: ArrayLike,
-    mean: Floats,
-    s: Floats,
-    arrows: str,
-    unit: Text,
-    *,
-    label: Text,
-    caption: Text,
+    targets: ArrayLike, mean: Floats, s: Floats, arrows: str, unit: Text, *, label: Text, caption: Text,
     alternative: Text,
-) -> Plot:
+) -> Plot:  # fmt: skip
     """Mean deviations ``mean`` (d, t) at targets (t,) of each direction, with two standard deviations ``s`` (d, t)."""
     across = style.finite("target", targets, (None,))
     with style.picture(62, left=0.105, right=0.975, bottom=0.16, top=0.92) as (figure, ax):
@@ -307,13 +294,11 @@ def trumpet(
         ax.set(xlabel=say("Length / mm"), ylabel=quantity, xlim=(0.0, 1.04 * float(x.max())))
         ax.margins(y=0.08)
         ax.grid(axis="y")
-        parts = (
-            (say("lines: ±MPE"), True),
-            (say("dashed: limits of acceptance, with the guard band between"), np.isfinite(accepted).any()),
-            (say("bars: U (k = 2)"), U.any()),
-            (say("crosses: not accepted"), marked.any()),
-        )
-        style.note(figure, semicolons([part for part, drawn in parts if drawn]))
+        between = say("dashed: limits of acceptance, with the guard band between")
+        style.note(figure, semicolons(holding(
+            (True, say("lines: ±MPE")), (np.isfinite(accepted).any(), between), (U.any(), say("bars: U (k = 2)")),
+            (marked.any(), say("crosses: not accepted")),
+        )))  # fmt: skip
         return style.drawn(figure, caption, alternative, "trumpet")
 
 

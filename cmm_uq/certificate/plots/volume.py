@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from cmm_uq.analysis.diagnosis.location import ResidualField
 from cmm_uq.analysis.planning.set_up import SetUp
@@ -144,7 +144,12 @@ def residual_field_plot(
                 if field.lengths:
                     style.strokes(ax, at[::2, 0], at[1::2, 0], at[::2, 1], at[1::2, 1], color=RULE, lw=0.8, zorder=1)
                 beyond = np.linalg.norm(values, axis=1) > limit
-                _vectors(ax, at, factor * values[:, (a, b)], beyond, colours[column])
+                way = factor * values[:, (a, b)]
+                (x0, y0), (x1, y1) = at[~beyond].T, (at + way)[~beyond].T
+                style.strokes(ax, x0, x1, y0, y1, color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
+                if beyond.any():
+                    arrows(ax, at[beyond], way[beyond], colours[column], units="width", width=0.006, headwidth=4, headlength=5,
+                           zorder=3)  # fmt: skip
                 ax.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
                 ax.locator_params(nbins=5)
                 ax.set_xlabel(say("{axis} / mm", axis=Verbatim(AXES[a].upper())), labelpad=1)
@@ -182,13 +187,6 @@ def _panels(planes: list[tuple[int, int]], columns: int, spans: Floats) -> tuple
         axes.append([figure.add_axes(((left + column * step) / WIDTH_MM, *size)) for column in range(columns)])
         y -= label
     return figure, axes
-
-
-def _vectors(ax: Axes, place: Floats, way: Floats, beyond: NDArray[np.bool_], colour: str) -> None:
-    (x0, y0), (x1, y1) = place[~beyond].T, (place + way)[~beyond].T
-    style.strokes(ax, x0, x1, y0, y1, color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
-    if beyond.any():
-        arrows(ax, place[beyond], way[beyond], colour, units="width", width=0.006, headwidth=4, headlength=5, zorder=3)
 
 
 def _key(figure: Figure, ax: Axes, factor: float, longest: float, limit: float, colour: str) -> None:

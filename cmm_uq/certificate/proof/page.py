@@ -8,7 +8,7 @@ import numpy as np
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.certificate.document import Document, Facts, Paragraph, Section, working_page
-from cmm_uq.certificate.origin import program
+from cmm_uq.certificate.origin import attributes, program
 from cmm_uq.certificate.proof import sections as parts
 from cmm_uq.certificate.proof.sections import DiagnosisProof, in_words, limits, standing
 from cmm_uq.certificate.result import Outcome
@@ -71,10 +71,11 @@ HOW_TO_CHECK: tuple[Text, ...] = (
     say(
         "{truth} holds the truth of every case, {records} what was said of it. The hash above is that of the "
         "first file as it stands: sha256sum {truth} gives it again.",
-        truth=Verbatim(TRUTH), records=Verbatim(RECORDS),
+        truth=Verbatim(TRUTH),
+        records=Verbatim(RECORDS),
     ),
     say("The same command with the same seed, on any number of processes, writes the same files."),
-)  # fmt: skip
+)
 
 
 def proof_document(proof: DiagnosisProof) -> Document:
@@ -97,8 +98,7 @@ def proof_document(proof: DiagnosisProof) -> Document:
 
     return working_page(
         facts, say("Validation of the diagnosis"), say("proved on {count} sealed cases", count=count),
-        particulars=(Facts(of_the_job), Facts(of_the_proof)),
-        warnings=warnings_of(proof),
+        particulars=(Facts(of_the_job), Facts(of_the_proof)), warnings=warnings_of(proof),
         sections=(
             parts.conclusion_section(conclusion_of(proof), proof.accepted),
             told(say("Purpose and method"), METHOD),
@@ -118,25 +118,23 @@ def warnings_of(proof: DiagnosisProof) -> tuple[Text, ...]:
         say("{what}: {rate}; asked for: {limits}. This is missed.", what=one.what, rate=in_words(one.rate), limits=limits(one))
         for one in proof.accepted if one.standing == MISSED
     ]  # fmt: skip
-    count = proof.judgement.refused.count
-    refused = plural(
-        count, one=say("One case got no answer; it counts in no other figure."),
-        many=say("{count} cases got no answer; they count in no other figure.", count=count),
-    )  # fmt: skip
-    return (*found, refused) if count else tuple(found)
+    if count := proof.judgement.refused.count:
+        many = say("{count} cases got no answer; they count in no other figure.", count=count)
+        found.append(plural(count, one=say("One case got no answer; it counts in no other figure."), many=many))
+    return tuple(found)
 
 
 def conclusion_of(proof: DiagnosisProof) -> Text:
     standings = [one.standing for one in proof.accepted]
     if MISSED in standings:
         return say("The diagnosis does not keep the acceptance figures on these set-ups.")
-    if OPEN in standings:
-        return say(
-            "The cases contradict no acceptance figure, but are too few to show that all of them are kept on these set-ups."
-        )
-    return say(
+    few = say(
+        "The cases contradict no acceptance figure, but are too few to show that all of them are kept on these set-ups."
+    )
+    kept = say(
         "The diagnosis keeps the acceptance figures on these set-ups, with a confidence of 95 % in each of them."
     )
+    return few if OPEN in standings else kept
 
 
 def often_words(proof: DiagnosisProof) -> Text:
@@ -199,8 +197,8 @@ def proof_results(proof: DiagnosisProof) -> dict[str, Any]:
     for reach in proof.reaches:
         times, wrong = judgement.of_effect(reach.effect)
         effects.append({
-            "effect": reach.effect, "standing": reach.standing, "parameter": reach.parameter, "unit": reach.unit,
-            "strength_per_unit": reach.per_unit, "allowed": reach.allowed, "found": _rate(times), "wrongly_named": wrong,
+            **attributes(reach, "effect", "standing", "parameter", "unit"), "strength_per_unit": reach.per_unit,
+            "allowed": reach.allowed, "found": _rate(times), "wrongly_named": wrong,
             "found_in_nine_of_ten": None if found is None else reach.amplitude(found.often),
             "columns": list(reach.columns), "alike": reach.alike or None,
         })  # fmt: skip
@@ -226,9 +224,7 @@ def proof_results(proof: DiagnosisProof) -> dict[str, Any]:
             "interval95": [None, None] if found is None else [_finite(end) for end in found.interval],
         },
         "effects": effects,
-        "artefact_faults": [
-            {"what": one.what, "shows": one.shows, "left": one.left, "like": one.like or None} for one in proof.faults
-        ],
+        "artefact_faults": [attributes(one, "what", "shows", "left") | {"like": one.like or None} for one in proof.faults],
         "by_noise": {
             kind: dict(zip(("false_alarms", "found", "coverage"), rates, strict=True)) for kind, rates in noises.items()
         },

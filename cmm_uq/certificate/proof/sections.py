@@ -33,10 +33,11 @@ NOISE_WORDS: Mapping[str, Text] = {
     cases.TAILS: say("heavy tails"), cases.RESOLUTION: say("coarse display"),
 }  # fmt: skip
 FAULT_WORDS: Mapping[str, Text] = {
-    "length": say("a wrong certified length"), "nodes": say("errors of its own points, common to all set-ups"),
+    "length": say("a wrong certified length"),
+    "nodes": say("errors of its own points, common to all set-ups"),
     "warm": say("another temperature than stated, the same throughout"),
     "warming": say("warming from one set-up to the next"),
-}  # fmt: skip
+}
 INTERVAL_WORDS: Mapping[str, Text] = {
     judgement.STATED: say("of effects that were found"),
     judgement.NAMED: say("of what the job names, nothing hidden"),
@@ -89,16 +90,14 @@ def cells(rate: Rate) -> tuple[Text, Text, Text]:
 
 
 def standing(figure: AcceptanceFigure) -> Text:
-    """Whether it is kept, and what would decide it."""
     told, undecided = STANDING_WORDS[figure.standing], figure.standing == OPEN
     if undecided and figure.kept and figure.cases is not None and figure.rate.of < figure.cases:
         return say("{told}; counted within the limit; {needed} cases of this sort without one would show it",
                    told=told, needed=figure.cases)  # fmt: skip
     if not (undecided and figure.rate.of):
         return told
-    return say("{told}; counted within the limits", told=told) if figure.kept else say(
-        "{told}; counted outside the limits", told=told
-    )  # fmt: skip
+    outside = say("{told}; counted outside the limits", told=told)
+    return say("{told}; counted within the limits", told=told) if figure.kept else outside
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +116,6 @@ class DiagnosisProof:
 
     @property
     def answers(self) -> bytes:
-        """All that was said, a line of JSON a case."""
         return b"".join(canonical_json(record) for record in self.records)
 
     @cached_property
@@ -140,12 +138,11 @@ class DiagnosisProof:
 
 def conclusion_section(conclusion: Text, figures: Sequence[AcceptanceFigure]) -> Section:
     rows = ((one.what, *cells(one.rate), limits(one), standing(one)) for one in figures)
-    note = say(
+    heads = (say("Figure"), *RATE_HEADS, say("Asked for"), say("Standing"))
+    return section(say("Conclusion"), Paragraph(conclusion), table(say("Acceptance"), heads, rows, say(
         "Shown or missed: the whole interval (Clopper and Pearson) lies within or beyond what is asked for. What is "
         "asked for was sealed with the truth."
-    )
-    heads = (say("Figure"), *RATE_HEADS, say("Asked for"), say("Standing"))
-    return section(say("Conclusion"), Paragraph(conclusion), table(say("Acceptance"), heads, rows, note))
+    )))  # fmt: skip
 
 
 def noise_section(proof: DiagnosisProof) -> Section:
@@ -158,20 +155,19 @@ def noise_section(proof: DiagnosisProof) -> Section:
     rows = ((what, say("{size:.3g} µm", size=size) if size else say("none")) for what, size in sizes)
     drawn_words = commas(
         say("{what} {count}", what=what, count=drawn_noise.count(kind))
-        for kind, what in NOISE_WORDS.items() if kind in drawn_noise
-    )  # fmt: skip
+        for kind, what in NOISE_WORDS.items()
+        if kind in drawn_noise
+    )
     facts = Facts(((say("Reading along x, y, z"), reading), *rows, (say("Noise of the cases"), drawn_words)))
     return section(say("Set-ups and noise"), facts)
 
 
 def answers_section(proof: DiagnosisProof) -> Section:
-    judged, rows = proof.judgement, []
+    judged, rows, answers = proof.judgement, [], (*DIAGNOSES, judgement.REFUSED)
     for kind, what in KIND_WORDS.items():
-        said = judged.verdicts(kind)
-        answers = (number(said.get(verdict, 0)) for verdict in (*DIAGNOSES, judgement.REFUSED))
-        right = number(sum(one.right for one in judged.of_kind(kind)))
-        rows.append((what, number(sum(said.values())), *answers, right))
-    answered = [Column(ANSWER_WORDS[verdict]) for verdict in (*DIAGNOSES, judgement.REFUSED)]
+        said, right = judged.verdicts(kind), sum(one.right for one in judged.of_kind(kind))
+        rows.append((what, *map(number, (sum(said.values()), *(said.get(verdict, 0) for verdict in answers), right))))
+    answered = [Column(ANSWER_WORDS[verdict]) for verdict in answers]
     verdicts = table(say("Verdicts"), (say("Hidden"), Column(say("Cases")), *answered, Column(say("Right"))), rows, say(
         "Right: consistent of nothing; explained of effects that are all found and no other named; of a function, "
         "that no known effect accounts for it; of a fault of the artefact, that something is there and no effect of "
@@ -179,21 +175,23 @@ def answers_section(proof: DiagnosisProof) -> Section:
     ))  # fmt: skip
     figures = (
         (say("False alarms, of cases that hide nothing"), judged.false_alarms),
-        (say("Right verdicts, of all cases"), judged.right), (say("Hidden effects found"), judged.found),
+        (say("Right verdicts, of all cases"), judged.right),
+        (say("Hidden effects found"), judged.found),
         (say("Hidden effects found and told from all others"), judged.found_alone),
         (say("Cases with a wrong name"), judged.wrong_names),
         (say("Detected functions that are taken for no effect"), judged.recognised),
         (say("Faults of the artefact blamed on the machine"), judged.machine_blamed),
         (say("Assertions that predict better what was held out"), judged.predicts_better),
-    )  # fmt: skip
+    )
     notes = [say(
         "Found: asserted, alone or as one of a group that is said not to be told apart. A wrong name: an effect "
         "asserted that does not act, in no group with one that does; of a fault of the artefact, any effect of "
         "the machine."
     )]  # fmt: skip
     if (ratio := judged.held_out_ratio) is not None:
-        held = say("Held out: the rms of predictions after over before is {ratio:.2f} in the median.", ratio=ratio)
-        notes.append(held)
+        notes.append(
+            say("Held out: the rms of predictions after over before is {ratio:.2f} in the median.", ratio=ratio)
+        )
     rates = table(say("Rates"), (say("What"), *RATE_HEADS), ((what, *cells(rate)) for what, rate in figures), *notes)
     return section(say("What was hidden, and what was said"), verdicts, rates)
 
@@ -234,20 +232,16 @@ def intervals_section(proof: DiagnosisProof) -> Section:
     judged = proof.judgement
     rows = [(what, *cells(judged.coverage_of(sort))) for sort, what in INTERVAL_WORDS.items()]
     rows.append((say("all but the last, pooled"), *cells(judged.coverage)))
-    note = say(
-        "95 % intervals that hold the truth. Those of one recording are not independent; the interval of the rate "
-        "allows for that. What is estimated beside a cause that was not found is shown for itself: it cannot be "
-        "right."
-    )
-    hold = table(say("95 % intervals that hold"), (say("Intervals"), *RATE_HEADS), rows, note)
-    return section(say("Intervals"), hold)
+    return section(say("Intervals"), table(say("95 % intervals that hold"), (say("Intervals"), *RATE_HEADS), rows, say(
+        "95 % intervals that hold the truth. Those of one recording are not independent; the interval of the rate allows for "
+        "that. What is estimated beside a cause that was not found is shown for itself: it cannot be right."
+    )))  # fmt: skip
 
 
 def kinds_section(proof: DiagnosisProof) -> Section:
-    by_kind = {kind: proof.judgement.by_noise(kind) for kind in dict.fromkeys(proof.design.noises)}
     rows = (
-        (NOISE_WORDS[kind], *(cell for rate in each for cell in (counted(rate), percent(rate))))
-        for kind, each in by_kind.items()
+        (NOISE_WORDS[kind], *(cell for rate in proof.judgement.by_noise(kind) for cell in cells(rate)[:2]))
+        for kind in dict.fromkeys(proof.design.noises)
     )
     counts = (say("False alarms"), say("Effects found"), say("Intervals that hold"))
     rates = (column for count in counts for column in (Column(count), Column(say("Rate"), unit("%"))))
@@ -292,12 +286,13 @@ def _smallest(proof: DiagnosisProof, reach: Reach) -> tuple[Text, Text]:
 
 def unseen_section(proof: DiagnosisProof) -> Section:
     standings: tuple[tuple[str, Text], ...] = (
-        (set_ups.TAKEN, say(
-            "Nothing of these shows, for they leave the observations as they are or what the job names takes all:"
-        )),
+        (
+            set_ups.TAKEN,
+            say("Nothing of these shows, for they leave the observations as they are or what the job names takes all:"),
+        ),
         (set_ups.TOO_SMALL, say("These drown in the noise even as large as physics allows:")),
         (set_ups.NO_TRAVEL, say("Not considered, for the job does not say what they need of the machine:")),
-    )  # fmt: skip
+    )
     texts: list[Text] = []
     for standing, what in standings:
         if effects := [reach.title for reach in proof.reaches if reach.standing == standing]:
@@ -325,9 +320,11 @@ EDGES = {"left": 0.09, "right": 0.985, "bottom": 0.15, "top": 0.96}  # of the ax
 
 def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], curve: DetectionCurve) -> Plot:
     """Part of the hidden effects that is found, by their strength, with the fitted curve."""
-    counted = [(low, high, rate) for low, high, rate in in_bins if rate.of]
-    middle = np.array([0.5 * (low + high) for low, high, _ in counted])
-    share, low, high = _rates([rate for _, _, rate in counted])
+    some = [one for one in in_bins if one[2].of]
+    middle, (share, low, high) = (
+        np.array([0.5 * (low + high) for low, high, _ in some]),
+        _rates([one[2] for one in some]),
+    )
     with picture(72, **EDGES) as (figure, ax):
         across = np.append(curve.strengths, curve.strengths[::-1])
         ax.fill(across, 100 * np.append(curve.low, curve.high[::-1]), color=BAND, lw=0, zorder=0)

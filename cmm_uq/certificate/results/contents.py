@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
-from cmm_uq.analysis.diagnosis.asserted import AlternativeSet, OmittedEffect
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis
 from cmm_uq.analysis.diagnosis.empirical.model import EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
@@ -24,7 +24,7 @@ from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.empirical import mistakes_data
 from cmm_uq.certificate.diagnosis.overview import sentence
-from cmm_uq.certificate.origin import quantity_data, software
+from cmm_uq.certificate.origin import attributes, quantity_data, software
 from cmm_uq.certificate.result import JobDiagnosis, Result
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
@@ -84,9 +84,8 @@ def results(result: Result) -> dict[str, Any]:
             "contradicts_stated": noise.contradicts_stated,
         },
         "sampling": {
-            "sampler": posterior.sampler, "seed": posterior.seed, "draws": len(posterior.draws),
-            "ess_min": posterior.ess_min, "rhat_max": posterior.rhat_max, "steps": posterior.steps,
-            "autocorrelation_time": posterior.autocorrelation_time, "converged": posterior.converged,
+            **attributes(posterior, "sampler", "seed"), "draws": len(posterior.draws),
+            **attributes(posterior, "ess_min", "rhat_max", "steps", "autocorrelation_time", "converged"),
         },
         "least_squares": _least_squares(result.least_squares),
         **contradictions_data(result),
@@ -101,7 +100,6 @@ def results(result: Result) -> dict[str, Any]:
 
 
 def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
-    """The ``diagnosis`` part."""
     d, changes, simulated = found.diagnosis, found.consequences, found.simulated
     return {
         **({} if simulated is None else {
@@ -110,25 +108,20 @@ def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
         }),
         "verdict": d.verdict, "p_value": d.p_value, **false_alarms(d.alpha),
         "where": [
-            {"covariate": place.covariate, "region": list(place.region), "p_value": place.p_value,
-             "amplitude_um": place.amplitude_um, "what": place.what, "direction": place.along, "also": list(place.also)}
+            {**attributes(place, "covariate", "region", "p_value", "amplitude_um", "what"), "direction": place.along,
+             "also": list(place.also)}
             for place in d.where
         ],
         "effects": [effect_data(item, d.improvement) for item in d.effects],
         "withheld": [
-            {"effect": item.effect, "probability": item.probability, "why": item.why, "periods_mm": _periods(item.modes)}
-            for item in d.withheld
+            {**attributes(item, "effect", "probability", "why"), "periods_mm": _periods(item.modes)} for item in d.withheld
         ],
         "indistinguishable": [list(group) for group in d.indistinguishable],
-        "suggested_measurements": [
-            {"separates": list(s.separates), "what": s.what, "repetitions": s.repetitions, "odds": s.odds}
-            for s in found.suggestions
-        ],
+        "suggested_measurements": [attributes(s, "separates", "what", "repetitions", "odds") for s in found.suggestions],
         "noise": {
             "stated_coordinate_um": found.job.facts.recording.u_coordinate_um,
             "coordinate_um": quantity_data(d.noise.coordinate), "placing_um": quantity_data(d.noise.placing),
-            "correlated_in_time": d.noise.correlated_in_time, "heavy_tails": d.noise.heavy_tails,
-            "contradicts_stated": d.noise.contradicts_stated,
+            **attributes(d.noise, "correlated_in_time", "heavy_tails", "contradicts_stated"),
         },
         "screening": [finding_data(f, found.job.facts.recording.file) for f in found.findings],
         "improvement": improvement_data(d.improvement),
@@ -153,35 +146,29 @@ def _beyond_effects(d: Diagnosis) -> dict[str, Any]:
     if repeats is not None and repeats.p_value < d.alpha:
         found["repeats"] = asdict(repeats)
     if best is not None:
-        found["best_known"] = {name: getattr(best, name) for name in ("effect", "probability", "odds_of_function")}
-        found["best_known"]["improvement"] = improvement_data(best.improvement)
+        gain = {"improvement": improvement_data(best.improvement)}
+        found["best_known"] = attributes(best, "effect", "probability", "odds_of_function") | gain
     if empirical is not None:
-        functions = [_function_data(one) for one in empirical.functions]
+        gain = improvement_data(empirical.improvement)
         found["empirical"] = {
             "predicts": empirical.predicts,
-            **improvement_data(empirical.improvement),
-            "functions": functions,
+            **gain,
+            "functions": [*map(_function, empirical.functions)],
         }
     return found
 
 
-def _function_data(one: EmpiricalFunction) -> dict[str, Any]:
+def _function(one: EmpiricalFunction) -> dict[str, Any]:
     term, form = one.term, one.form
-    named = None
-    if form is not None:
-        named = {"name": form.name, "probability": form.probability, "parameters": _quantities(form.parameters)}
-    scale = term.along is not None and term.along == term.lever
-    found: dict[str, Any] = {
-        "of": term.of,
-        "along": term.along,
-        "proportional_to": term.lever,
-        "scale": scale,
-        "name": term.title,
-    }
-    found |= {"probability": one.probability, "also": list(one.also), "amplitude_um": one.amplitude_um}
-    curve = dict(zip(("at", "error_um", "u_um"), (values.tolist() for values in one.curve), strict=True))
-    forms = [{"form": name, "probability": p} for name, p in one.forms]
-    return found | {"forms": forms, "form": named, "curve": curve, "effect": one.stated}
+    return {
+        "of": term.of, "along": term.along, "proportional_to": term.lever,
+        "scale": term.along is not None and term.along == term.lever, "name": term.title,
+        **attributes(one, "probability", "also", "amplitude_um"),
+        "forms": [{"form": name, "probability": p} for name, p in one.forms],
+        "form": form and attributes(form, "name", "probability") | {"parameters": _quantities(form.parameters)},
+        "curve": dict(zip(("at", "error_um", "u_um"), (values.tolist() for values in one.curve), strict=True)),
+        "effect": one.stated,
+    }  # fmt: skip
 
 
 def false_alarms(alpha: float) -> dict[str, float]:
@@ -198,8 +185,7 @@ def corrections(found: JobDiagnosis, simulated: SimulatedTwin) -> dict[str, dict
 
 
 def _periods(modes: Sequence[Mode]) -> list[dict[str, Any]]:
-    return [{"value": m.period.value, "u": m.period.u, "interval95": list(m.period.interval95),
-             "probability": m.probability} for m in modes]  # fmt: skip
+    return [attributes(m.period, "value", "u", "interval95") | {"probability": m.probability} for m in modes]
 
 
 def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | None:
@@ -248,15 +234,12 @@ def costs_data(result: JobDiagnosis) -> dict[str, Any]:
 
 
 def unseen_data(rows: Sequence[SmallestEffect]) -> list[dict[str, Any]]:
-    """Every effect."""
     return [
         {
-            "effect": row.effect, "parameter": row.parameter, "detected": row.detected, "named": row.named,
-            "allowed": row.allowed, "shown": row.shown, "share": row.share,
+            **attributes(row, "effect", "parameter", "detected", "named", "allowed", "shown", "share"),
             "taken_up_by": [name for name in row.taken_up if name != PLACES],
-            **({} if row.periods is None else {"periods": {
-                "parameter": row.periods.parameter, "low": row.periods.low, "high": row.periods.high,
-                "worst": row.periods.worst, "unresolved": [list(each) for each in row.periods.unresolved],
+            **({} if row.periods is None else {"periods": attributes(row.periods, "parameter", "low", "high", "worst") | {
+                "unresolved": [list(each) for each in row.periods.unresolved],
             }}),
         }
         for row in rows
@@ -265,44 +248,31 @@ def unseen_data(rows: Sequence[SmallestEffect]) -> list[dict[str, Any]]:
 
 def effect_data(item: OmittedEffect, gain: Improvement) -> dict[str, Any]:
     return {
-        "effect": item.effect, "probability": item.probability, "probability_together": item.together,
-        "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),
+        **attributes(item, "effect", "probability"), "probability_together": item.together,
+        **attributes(item, "group", "explained"), "parameters": _quantities(item.parameters),
         **({"other_periods_mm" if item.settled else "periods_mm": _periods(item.modes)} if item.modes else {}),
-        **({"alternatives": [_alternative_data(one) for one in item.alternatives]} if item.alternatives else {}),
+        **({"alternatives": [attributes(one, *ALTERNATIVE) for one in item.alternatives]} if item.alternatives else {}),
         "words": sentence(item, gain),
     }  # fmt: skip
 
 
-def _alternative_data(one: AlternativeSet) -> dict[str, Any]:
-    return {name: getattr(one, name) for name in ("odds", "prior_odds")} | {
-        name: list(getattr(one, name)) for name in ("effects", "instead_of", "sizes")
-    }
+ALTERNATIVE = ("odds", "prior_odds", "effects", "instead_of", "sizes")  # what is stated of a set of effects instead
 
 
 def improvement_data(gain: Improvement) -> dict[str, Any]:
-    return {
-        "rms_before_um": gain.rms_before_um, "rms_after_um": gain.rms_after_um,
-        "heldout_rms_before_um": gain.heldout_rms_before_um, "heldout_rms_after_um": gain.heldout_rms_after_um,
-        "elpd_gain": gain.elpd_gain, "elpd_gain_se": gain.elpd_gain_se,
-    }  # fmt: skip
+    return attributes(gain, "rms_before_um", "rms_after_um", "heldout_rms_before_um", "heldout_rms_after_um", "elpd_gain",
+                      "elpd_gain_se")  # fmt: skip
 
 
 def tolerances_data(verdicts: Verdicts) -> dict[str, Any]:
     """Each parameter that is determined with its tolerance, and whether it is in or out, or neither is proved."""
-    found: dict[str, Any] = {}
-    for one in verdicts:
-        if not one.by and one.value is not None:
-            effect, _, parameter = one.name.partition(".")
-            found[effect] = {parameter: one.limit, "verdict": TOLERANCE_WORDS[one.outcome]}
-    return found
+    judged = ((one.name.partition("."), one) for one in verdicts if not one.by and one.value is not None)
+    return {of[0]: {of[2]: one.limit, "verdict": TOLERANCE_WORDS[one.outcome]} for of, one in judged}
 
 
 def covariance_data(covariance: Covariance) -> dict[str, Any]:
     """How estimates vary together; an element of the matrix is in the product of the units of its row and column."""
-    return {
-        "parameters": list(covariance.parameters), "units": list(covariance.units),
-        "matrix": covariance.matrix.tolist(),
-    }  # fmt: skip
+    return attributes(covariance, "parameters", "units") | {"matrix": covariance.matrix.tolist()}
 
 
 def contradictions_data(result: Result) -> dict[str, Any]:
@@ -342,18 +312,19 @@ def _identifiability(result: Result) -> dict[str, Any]:
     free = [{name: float(part) for name, part in zip(names, column, strict=True) if part} for column in ls.null_space.T]
     denied = (*result.left_to_prior, *(one.key for one in result.contradictions), *result.denied)
     return {
-        "parameters": int(ls.rank + ls.null_space.shape[1]), "rank": ls.rank,
+        "parameters": int(ls.rank + ls.null_space.shape[1]),
+        "rank": ls.rank,
         "condition_number": ls.condition if np.isfinite(ls.condition) else None,
         "undetermined": free + [{".".join(key): 1.0} for key in denied],
         "prior_share": {name: result.prior_share(u.key) for name, u in zip(names, ls.unknowns, strict=True)},
-    }  # fmt: skip
+    }
 
 
 def statement_data(statement: Statement) -> dict[str, Any]:
     return {
-        "standard": statement.facts.standard, "characteristic": statement.characteristic,
-        "quantity": statement.quantity, "value_um": statement.value_um, "signed": statement.signed,
-        "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
+        "standard": statement.facts.standard,
+        **attributes(statement, "characteristic", "quantity", "value_um", "signed", "limit_um", "u_um"),
+        "rule": rule_name(statement.facts.rule),
         "guard_band_um": statement.decision.guard_band, "decision": statement.outcome, "finding": statement.finding,
         "probability_conforming": statement.decision.probability_conforming, "scope": statement.scope,
         "missing": list(statement.missing_with_remedies), "remarks": list(statement.remarks),
@@ -361,17 +332,14 @@ def statement_data(statement: Statement) -> dict[str, Any]:
         "mpe": None if statement.facts.mpe is None else statement.facts.mpe.model_dump(),
         **({} if statement.facts.limit_arcsec is None else {"limit_arcsec": statement.facts.limit_arcsec}),
         "prior": None if statement.facts.prior is None else statement.facts.prior.model_dump(),
-        "global_risks": None if statement.risks is None else {
-            "consumer": statement.risks.consumer, "producer": statement.risks.producer,
-        },
+        "global_risks": statement.risks and attributes(statement.risks, "consumer", "producer"),
         "test_uncertainty": None if statement.budget is None else budget_data(statement.budget),
         "outside": list(statement.outside),
         "errors": [
-            {"measurement": item.measurement, "repeat": item.repeat, "length_mm": item.length_mm, "error_um": item.error_um,
-             "u_um": item.u_um, "U_um": 2 * item.u_um, "limit_um": item.limit_um,
-             "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
-             "guard_band_um": item.decision.guard_band, "position": item.position or None, "standing": item.standing,
-             "set_aside": item.set_aside}
+            {**attributes(item, "measurement", "repeat", "length_mm", "error_um", "u_um"), "U_um": 2 * item.u_um,
+             "limit_um": item.limit_um, **attributes(item.decision, "probability_conforming", "outcome"),
+             "guard_band_um": item.decision.guard_band, "position": item.position or None,
+             **attributes(item, "standing", "set_aside")}
             for item in statement.errors
         ],
     }  # fmt: skip

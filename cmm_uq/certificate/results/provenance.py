@@ -15,6 +15,7 @@ import json
 import platform
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distributions, version
@@ -37,12 +38,10 @@ _CORE = ("scipy_openblas_get_corename64_", "scipy_openblas_get_corename", "openb
 @cache
 def packages() -> dict[str, str]:
     """Versions, by name; without those that are not installed as packages."""
-    found = {}
+    found: dict[str, str] = {}
     for name in PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            continue
     return found
 
 
@@ -111,8 +110,6 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True)
 class Behind:
-    """What is behind a certificate, of whatever."""
-
     command: str  # of ``cmm-uq`` that made it
     said: Identification  # as its job has it
     laboratory: Laboratory
@@ -246,10 +243,11 @@ class ChangedFigure:
     @property
     def sentence(self) -> Text:
         before, after = (
-            say("none") if not printed
-            else say("{printed} {unit}", printed=printed, unit=self.unit) if self.unit else printed
+            say("{printed} {unit}", printed=printed, unit=self.unit)
+            if printed and self.unit
+            else printed or say("none")
             for printed in (self.before, self.after)
-        )  # fmt: skip
+        )
         return say("{what}: {before} → {after}", what=self.what, before=before, after=after)
 
     @property
@@ -272,10 +270,10 @@ class Reissue:
         if self.compared is None:
             return NOT_COMPARED
         if not self.differences:
-            one = say("Both results were compared: the one decision or figure does not differ.")
             many = say(
                 "Both results were compared: of {count} decisions and figures none differs.", count=self.compared
             )
+            one = say("Both results were compared: the one decision or figure does not differ.")
             return plural(self.compared, one=one, many=many)
         named: list[Text] = [one.sentence for one in self.differences[:_NAMED]]
         if (more := len(self.differences) - _NAMED) > 0:

@@ -1,22 +1,33 @@
-"""Statements of conformity: decision, evidence, and the budget of the test uncertainty."""
+"""Statements of conformity: decision, evidence, and the budget of the test uncertainty; figures of performance.
+
+These as recorded, and of the machine alone, without noise; and the errors of a machine by what each made of the recording, as
+a picture: what to correct first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
+from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.analysis.conformity.own_rule import titled
 from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
-from cmm_uq.analysis.machine.performance import MachinePerformance
+from cmm_uq.analysis.machine.performance import MachinePerformance, contributions
+from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.base import messages
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, number, plural, say
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, plural, say, semicolons, signed
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, columns
-from cmm_uq.certificate.plots.residuals import trumpet
-from cmm_uq.certificate.wording import OUTCOME_WORDS, interval_of, probability, stated_value
+from cmm_uq.certificate import wording
+from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, columns, section
+from cmm_uq.certificate.origin import quantity_data
+from cmm_uq.certificate.plots.residuals import budget_bars, trumpet
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import OUTCOME_WORDS, effect_title, interval_of, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
-from cmm_uq.maths.uncertainty.quantity import figure, limit_in_full, nominal, rounded, significant
+from cmm_uq.maths.uncertainty.quantity import Quantity, figure, limit_in_full, nominal, rounded, significant
 
 
 def budget_table(measurand: Text, budget: Budget) -> Table:
@@ -77,27 +88,18 @@ def decision_block(statement: Statement, machine: MachinePerformance | None = No
                          statement.outcome, told, statement.missing)  # fmt: skip
 
 
-def without_noise(statement: Statement, machine: MachinePerformance | None) -> tuple[Text, ...]:
+def without_noise(statement: Statement, machine: MachinePerformance | None) -> list[Text]:
     """How large of the machine alone is what was decided, with noise, as recorded."""
     found = None if machine is None else machine.of_statement(statement)
-    if found is None:
-        return ()
-    recorded, own = found
-    return (
-        say(
-            "Decided is what was recorded, noise included, {recorded} µm at most; of the machine without noise this is "
-            "{interval} µm (95 % interval).",
-            recorded=rounded(recorded, own.expanded)[0],
-            interval=interval_of(own),
-        ),
-    )
+    return [] if found is None else [say(
+        "Decided is what was recorded, noise included, {recorded} µm at most; of the machine without noise this is {interval} "
+        "µm (95 % interval).", recorded=rounded(found[0], found[1].expanded)[0], interval=interval_of(found[1]),
+    )]  # fmt: skip
 
 
 def named(statement: Statement) -> Text:
-    standard = titled(statement.facts.standard)
-    if not statement.characteristic:
-        return standard
-    return say("{standard}, {characteristic}", standard=standard, characteristic=Verbatim(statement.characteristic))
+    standard, what = titled(statement.facts.standard), Verbatim(statement.characteristic)
+    return say("{standard}, {characteristic}", standard=standard, characteristic=what) if what else standard
 
 
 def formula(facts: ConformityFacts) -> Text:
@@ -107,24 +109,23 @@ def formula(facts: ConformityFacts) -> Text:
         return say("{limit} ″", limit=limit_in_full(facts.limit_arcsec))
     if mpe is None:
         return say("{limit} µm", limit=limit_in_full(facts.limit_um or 0.0))
+    b = limit_in_full(mpe.b_um or 0.0)
     if mpe.a_um is None or mpe.k is None:
-        return say("{b} µm", b=limit_in_full(mpe.b_um or 0.0))
+        return say("{b} µm", b=b)
     line = say("({a} + L/{k}) µm", a=limit_in_full(mpe.a_um), k=limit_in_full(mpe.k))
-    if mpe.b_um is None:
-        return say("{line}, L in mm", line=line)
-    return say("the lesser of {line} and {b} µm, L in mm", line=line, b=limit_in_full(mpe.b_um))
+    least = say("the lesser of {line} and {b} µm, L in mm", line=line, b=b)
+    return say("{line}, L in mm", line=line) if mpe.b_um is None else least
 
 
 def _limit(statement: Statement) -> Text:
+    facts, length = statement.facts, statement.named.length_mm
     here = say("{limit} µm", limit=limit_in_full(statement.limit_um))
-    if statement.facts.mpe is None and statement.facts.limit_arcsec is None:
+    if facts.mpe is None and facts.limit_arcsec is None:
         return here
-    length = statement.named.length_mm
     if length is not None:
         here = say("{limit} at L = {length} mm", limit=here, length=nominal(length))
-    if statement.facts.limit_arcsec is not None:
-        return say("{here}; {formula}", here=here, formula=formula(statement.facts))
-    return say("{here}; MPE = {formula}", here=here, formula=formula(statement.facts))
+    by = say("{here}; {formula}", here=here, formula=formula(facts))
+    return say("{here}; MPE = {formula}", here=here, formula=formula(facts)) if facts.limit_arcsec is None else by
 
 
 def _what_follows(statement: Statement) -> list[Text]:
@@ -217,8 +218,106 @@ def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: b
     decision = OUTCOME_WORDS[worst.outcome]
     return (
         DASH if worst.measurement is None else number(worst.measurement),
-        *((DASH if worst.length_mm is None else nominal(worst.length_mm),) if lengths else ()), values,
+        *((DASH if worst.length_mm is None else nominal(worst.length_mm),) if lengths else ()),
+        values,
         *((significant(2 * worst.u_um), DASH if chance is None else probability(chance)) if known else ()),
         limit_in_full(worst.limit_um),
         say("{decision}, {standing}", decision=decision, standing=standing) if standing else decision,
-    )  # fmt: skip
+    )
+
+
+def machine_alone(result: Result) -> MachinePerformance | None:
+    """``None`` where nothing is stated of the machine without noise."""
+    regions = result.regions
+    return regions.performance if isinstance(regions, FactorRegions) else None
+
+
+def own_figures(result: Result) -> Mapping[str, Quantity]:
+    """Of the machine, without noise; U not below the laboratory's capability."""
+    machine = machine_alone(result)
+    found: Mapping[str, Quantity] = {} if machine is None else machine.figures
+    return found if result.stating is None else result.stating.all("performance_of_machine", found)
+
+
+_LESS = 0.9  # part of U below which it is said what U would be
+
+
+def returning_figures(result: Result) -> dict[str, Quantity]:
+    """Whose U would be less by a tenth or more if what named errors leave at each set-up were the machine's."""
+    found = result.returning if result.stating is None else result.stating.all("accuracy", result.returning)
+    each = ((name, one, result.accuracy[name]) for name, one in found.items())
+    return {name: one for name, one, stated in each if one.expanded < _LESS * stated.expanded}
+
+
+def performance(result: Result) -> Section:
+    """Figures of the lengths; without blocks for an artefact that has none."""
+    title, own, regions = say("Figures of performance"), own_figures(result), result.regions
+    if not result.accuracy:
+        return section(title)
+    machine = (say("Without noise from"), say("to")) if own else ()
+    figures = (say("Value"), say("U"), say("k"), *machine)
+    heads: tuple[Text | Column, ...] = (say("Quantity"), *map(Column, figures), say("Unit"))
+    rows = []
+    for name, one in result.accuracy.items():
+        ends: tuple[Text, ...] = (NOTHING, NOTHING) if own else ()
+        if name in own:
+            ends = tuple(rounded(end, own[name].expanded)[0] for end in own[name].interval95)
+        rows.append((TITLES[name], *wording.stated(one), *ends, one.unit))
+    notes: list[Text] = [wording.UNCERTAINTY, say(
+        "Each figure estimates what the machine would show on average if the recording were "
+        "repeated; all recorded lengths count. The test value of a statement of conformity is another quantity, that of "
+        "this recording alone, and its U is the test uncertainty."
+    )]  # fmt: skip
+    if again := returning_figures(result):
+        would = semicolons(
+            say("{figure:small} {U} {unit}", figure=TITLES[name], U=rounded(one.value, one.expanded)[1], unit=one.unit)
+            for name, one in again.items()
+        )
+        notes.append(say(
+            "U counts what the named errors leave at each set-up, and its repeats share, as noise that would be another if "
+            "the recording were repeated. If it is other errors of the machine, which would be there again, U is too wide, "
+            "and would be: {figures}.", figures=would,
+        ))  # fmt: skip
+    if own:
+        notes.append(say("Without noise: the 95 % interval of the same figure of the machine alone, by all of its errors "
+                         "together; nothing is decided by it."))  # fmt: skip
+    elif not isinstance(regions, FactorRegions) and regions:
+        notes.append(say("What of them is the machine's alone, without noise, is not stated: {why}.", why=regions))
+    notes += wording.skewed_note(result.accuracy.values())
+    return section(title, Table(title, columns(heads), tuple(rows), tuple(notes)))
+
+
+def with_performance(data: Mapping[str, Any], result: Result) -> dict[str, Any]:
+    """Contents of results.json with the machine's own figures, and those of each statement."""
+    own, machine = {name: quantity_data(one) for name, one in own_figures(result).items()}, machine_alone(result)
+    found = dict(data) | ({"performance_of_machine": own} if own else {})
+    if again := returning_figures(result):
+        found["accuracy_if_left_returns"] = {name: quantity_data(one) for name, one in again.items()}
+    if machine is None:
+        return found
+    each = [machine.of_statement(statement) for statement in result.statements]
+    found["conformity"] = [
+        stated if one is None else {**stated, "largest_um": one[0], "largest_without_noise_um": quantity_data(one[1])}
+        for stated, one in zip(found["conformity"], each, strict=True)
+    ]
+    return found
+
+
+def ranking_plot(result: Result) -> Plot:
+    """Share of every named error in what the recording deviates by, the largest first."""
+    ranked = contributions(result.model, result.posterior.draws.mean(axis=0))
+    names = [say("{what}, {rms} µm", what=_called(one.owner, result), rms=significant(one.rms_um)) for one in ranked]
+    shares = [one.share for one in ranked]
+    parts = ((name, signed(100 * share, ".0f")) for name, share in zip(names, shares, strict=True))
+    told = commas(say("{name}: {share} %", name=name, share=share) for name, share in parts)
+    caption = say(
+        "What each error makes of the recorded deviations: its share of their sum of squares, and its root mean square in one "
+        "coordinate. A share below zero takes away from what others make."
+    )
+    return budget_bars(names, shares, caption=caption, alternative=told)
+
+
+def _called(owner: str | None, result: Result) -> Text:
+    if owner is None:
+        return say("What no named error explains")
+    return say("Sizes of the artefact") if owner == ARTEFACT else effect_title(owner, result.model.effects)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from cmm_uq.analysis.conformity.uncertainty import unknown_expansion
-from cmm_uq.analysis.screening.columns import Finding
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, number, say, sentences
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, holding, listed, number, say, sentences
 from cmm_uq.certificate.diagnosis.overview import VERDICT_SENTENCES
-from cmm_uq.certificate.document import Facts, Paragraph, Section, section
+from cmm_uq.certificate.document import Paragraph, Section, facts, section
 from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.result import RecordingNoise, Result
 from cmm_uq.certificate.sections.regions import regions_warnings
@@ -80,10 +79,10 @@ def posterior_section(result: Result) -> Section:
 def method(result: Result) -> Section:
     ls, posterior, noise = result.least_squares, result.posterior, result.noise
     sigma, (low, high), stated = noise.coordinate.value, noise.coordinate.interval95, noise.stated_um
-    if stated is None:
-        spread = say("{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals",
-                     sigma=sigma, low=low, high=high)  # fmt: skip
-    else:
+    spread = say(
+        "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals", sigma=sigma, low=low, high=high
+    )
+    if stated is not None:
         spread = say(
             "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the stated {stated:.3g} µm and the residuals",
             sigma=sigma, low=low, high=high, stated=stated,
@@ -91,7 +90,7 @@ def method(result: Result) -> Section:
     if noise.p_value is not None:
         spread = say("{spread}; residuals under the stated figure: p = {p:.2g}", spread=spread, p=noise.p_value)
     count = ls.rank + ls.null_space.shape[1]
-    rows = (
+    stated_facts = facts(
         (say("Observations used"), number(len(ls.residuals))),
         (say("Parameters, rank, condition number"),
          say("{count}, {rank}, {condition:.3g}", count=count, rank=ls.rank, condition=ls.condition)),
@@ -123,38 +122,32 @@ def method(result: Result) -> Section:
         "factorisation) and as a posterior distribution with priors as wide as physics allows; {length}. The attached job, "
         "recording and results.json suffice to run it again.",
         what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
-        length=say("the certified length enters with its uncertainty")
-        if certified
-        else say("no certified length enters"),
-    )
-    return section(say("Method"), Paragraph(text), Facts(tuple(row for row in rows if row[1])))
+        length=say("the certified length enters with its uncertainty") if certified else say("no certified length enters"),
+    )  # fmt: skip
+    return section(say("Method"), Paragraph(text), stated_facts)
 
 
 def _stated(result: Result) -> Text:
     """What is stated of the artefact's temperature, expansion, alignment and fixturing, and which figures it reaches."""
-    causes = [cause.name for cause in result.causes if cause.name != CALIBRATION]
-    if causes:
+    if causes := listed([cause.name for cause in result.causes if cause.name != CALIBRATION]):
         return say(
             "the uncertainty stated of {causes} is in U of all estimates, of figures of lengths and of the slopes of lines, "
             "as of an error that all set-ups share and as of one that each has by itself, whichever is larger; it is not in "
             "residuals, noise, least squares and the diagnosis",
-            causes=listed(causes),
+            causes=causes,
         )
-    if not result.job.circumstances.uncertainty.of_artefact:
-        return NOTHING
-    return say("what is stated of temperature, expansion, alignment and fixturing changes none of the estimates here")
+    none = say("what is stated of temperature, expansion, alignment and fixturing changes none of the estimates here")
+    return none if result.job.circumstances.uncertainty.of_artefact else NOTHING
 
 
 def _calibration(result: Result) -> Text:
     found = next((cause for cause in result.causes if cause.name == CALIBRATION), None)
-    if found is None:
-        return NOTHING
-    if found.apart is None:
-        return say("errors of the calibrated lengths are taken with the covariance that their certificate states")
-    return say(
+    stated = say("errors of the calibrated lengths are taken with the covariance that their certificate states")
+    unknown = say(
         "errors of the calibrated lengths are taken as of one cause and as of each place by itself; in every figure the "
         "larger U stands"
     )
+    return NOTHING if found is None else stated if found.apart is None else unknown
 
 
 ASSUMED = 0.25  # share of the prior in a parameter's variance from which on the reader is told
@@ -162,11 +155,11 @@ ASSUMED = 0.25  # share of the prior in a parameter's variance from which on the
 
 def warnings(result: Result) -> tuple[Text, ...]:
     each = (_mismatch, _noise, _expansion, _implausible, _undetermined, _contradicted, regions_warnings)
-    return (
-        *not_converged(result.posterior),
-        *(text for of in each for text in of(result)),
-        *map(_screened, result.findings),
-    )
+    screened = (
+        say("{why:capital}. It is set aside: not used for the error factors.", why=one.why) if one.set_aside
+        else say("{why:capital}. It is used as it stands.", why=one.why) for one in result.findings
+    )  # fmt: skip
+    return (*not_converged(result.posterior), *(text for of in each for text in of(result)), *screened)
 
 
 def not_converged(sampled: Posterior | Chains) -> list[Text]:
@@ -174,26 +167,25 @@ def not_converged(sampled: Posterior | Chains) -> list[Text]:
     told = say(
         "The sampling did not converge (least effective sample size {ess_min:.0f}, R-hat "
         "{rhat_max:.3f}): estimates and uncertainties must not be used.",
-        ess_min=sampled.ess_min, rhat_max=sampled.rhat_max,
-    )  # fmt: skip
+        ess_min=sampled.ess_min,
+        rhat_max=sampled.rhat_max,
+    )
     return [] if sampled.converged else [told]
 
 
 def _mismatch(result: Result) -> list[Text]:
     diagnosis = result.diagnosed.diagnosis
-    if diagnosis.agrees:
-        return []
-    said = [VERDICT_SENTENCES[diagnosis.verdict]]
-    if diagnosis.effects:
-        said.append(say("It shows: {named}.", named=listed([item.title for item in diagnosis.effects])))
-    holds = say("The figures below hold for the named model; see the diagnosis.")
-    if result.averaged:
-        holds = say(
-            "Estimates below, and what is computed from them, are averaged over {rivals} explanations that remain, by their "
-            "probabilities; noise, and figures of the readings as recorded, hold for the named model. See the diagnosis.",
-            rivals=result.averaged,
-        )
-    return [sentences((*said, holds))]
+    shown = listed([item.title for item in diagnosis.effects])
+    averaged = say(
+        "Estimates below, and what is computed from them, are averaged over {rivals} explanations that remain, by their "
+        "probabilities; noise, and figures of the readings as recorded, hold for the named model. See the diagnosis.",
+        rivals=result.averaged,
+    )
+    return [] if diagnosis.agrees else [sentences(holding(
+        (True, VERDICT_SENTENCES[diagnosis.verdict]), (shown, say("It shows: {named}.", named=shown)),
+        (result.averaged, averaged),
+        (not result.averaged, say("The figures below hold for the named model; see the diagnosis.")),
+    ))]  # fmt: skip
 
 
 def _noise(result: Result) -> list[Text]:
@@ -207,14 +199,13 @@ def _noise(result: Result) -> list[Text]:
             "The uncertainties below rest on the residuals ({value} µm), not on the stated figure.",
             stated_um=stated, p_value=noise.p_value, value=value,
         ))  # fmt: skip
-    if freedom < 3 and noise.stated_um is None:
-        texts.append(say("Only {degrees_of_freedom} degrees of freedom are left to estimate the noise from.",
-                         degrees_of_freedom=freedom))  # fmt: skip
-    exact = [size.title for size in result.artefact.sizes if size.certified and size.sd == 0]
+    few = say(
+        "Only {degrees_of_freedom} degrees of freedom are left to estimate the noise from.", degrees_of_freedom=freedom
+    )
+    texts += holding((freedom < 3 and noise.stated_um is None, few))
+    exact = [one.title for one in result.artefact.sizes if one.certified and one.sd == 0]
     exact += [title for title, _ in result.artefact.exact]
-    return texts + [
-        say("{title} is given without an uncertainty and is taken as exact.", title=title) for title in exact
-    ]
+    return texts + [say("{title} is given without an uncertainty and is taken as exact.", title=each) for each in exact]
 
 
 def _expansion(result: Result) -> list[Text]:
@@ -229,28 +220,21 @@ def _implausible(result: Result) -> list[Text]:
     texts: list[Text] = []
     means = result.values.mean(axis=0)
     for unknown, taken, mean in zip(result.model.unknowns, result.posterior.unknowns, means, strict=True):
-        off = mean - unknown.prior_mean
+        off, title, of = mean - unknown.prior_mean, title_of(unknown.key, result), unknown.unit
         if 0 < unknown.prior_sd < abs(off) / IMPLAUSIBLE:
-            parameter = title_of(unknown.key, result)
-            if unknown.prior_mean:
-                parameter = say("Correction of the {what:small}, {nominal} {unit}", what=parameter,
-                                nominal=nominal(unknown.prior_mean), unit=unknown.unit)  # fmt: skip
+            correction = say("Correction of the {what:small}, {nominal} {unit}", what=title,
+                             nominal=nominal(unknown.prior_mean), unit=of)  # fmt: skip
             texts.append(say(
                 "{parameter}: {off} {unit} is {times:.0f} times the standard uncertainty with which it was known "
                 "beforehand ({sd} {unit}). Before it is used, rule out a wrong certified length, unit or expansion.",
-                parameter=parameter, off=figure(off), unit=unknown.unit, times=abs(off) / unknown.prior_sd,
-                sd=figure(unknown.prior_sd, 3),
+                parameter=correction if unknown.prior_mean else title, off=figure(off), unit=of,
+                times=abs(off) / unknown.prior_sd, sd=figure(unknown.prior_sd, 3),
             ))  # fmt: skip
         if taken.prior_sd > unknown.prior_sd:
-            texts.append(
-                say(
-                    "{parameter}: the recording contradicts what was known beforehand so clearly that {sd} {unit} was taken "
-                    "as its standard uncertainty instead.",
-                    parameter=title_of(unknown.key, result),
-                    sd=figure(taken.prior_sd, 3),
-                    unit=unknown.unit,
-                )
-            )
+            texts.append(say(
+                "{parameter}: the recording contradicts what was known beforehand so clearly that {sd} {unit} was taken "
+                "as its standard uncertainty instead.", parameter=title, sd=figure(taken.prior_sd, 3), unit=of,
+            ))  # fmt: skip
     return texts
 
 
@@ -263,14 +247,12 @@ def _undetermined(result: Result) -> list[Text]:
     for unknown in result.posterior.unknowns:
         share, left = result.prior_share(unknown.key), unknown.key in result.left_to_prior
         if left or (share > ASSUMED and unknown.key not in result.not_given and not unknown.known):
-            of = (
-                say("{parameter} is not determined by this recording", parameter=title_of(unknown.key, result))
-                if left
-                else say("{parameter} is hardly determined by this recording", parameter=title_of(unknown.key, result))
-            )
+            title = title_of(unknown.key, result)
+            hardly = say("{parameter} is hardly determined by this recording", parameter=title)
             texts.append(say(
                 "{of}: {share:.0f} % of its variance is the assumption that it lies within about ±{prior_sd:g} {unit}.",
-                of=of, share=100 * share, prior_sd=2 * unknown.prior_sd, unit=unknown.unit,
+                of=say("{parameter} is not determined by this recording", parameter=title) if left else hardly,
+                share=100 * share, prior_sd=2 * unknown.prior_sd, unit=unknown.unit,
             ))  # fmt: skip
     return texts
 
@@ -285,8 +267,3 @@ def _contradicted(result: Result) -> list[Text]:
         )
         for one in result.contradictions
     ]  # fmt: skip
-
-
-def _screened(finding: Finding) -> Text:
-    aside = say("{why:capital}. It is set aside: not used for the error factors.", why=finding.why)
-    return aside if finding.set_aside else say("{why:capital}. It is used as it stands.", why=finding.why)

@@ -10,7 +10,20 @@ from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.analysis.conformity.decision import rule_words
 from cmm_uq.analysis.conformity.own_rule import titled
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, listed, names, number, plural, say, semicolons
+from cmm_uq.base import messages
+from cmm_uq.base.messages import (
+    NOTHING,
+    Text,
+    Verbatim,
+    commas,
+    holding,
+    listed,
+    names,
+    number,
+    plural,
+    say,
+    semicolons,
+)
 from cmm_uq.base.units import unit
 from cmm_uq.certificate import document as doc, wording
 from cmm_uq.certificate.document import Block, Plot, Section, Table, section
@@ -39,23 +52,23 @@ def error_factors(result: Result) -> Section:
     fitted = {unknown.key: value for unknown, value in zip(ls.unknowns, ls.value, strict=True)}
     rows: list[tuple[Text, ...]] = []
     for key, quantity in reported(result):
-        if key in result.not_given:
-            why = say("not given") if key in contradicted else say("not determined")
-            rows.append((wording.title_of(key, result), why, NOTHING, NOTHING, NOTHING, quantity.unit))
-            continue
-        least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
-        rows.append((wording.title_of(key, result), *wording.stated(quantity), least, quantity.unit))
+        figures: tuple[Text, ...] = (say("not determined"), NOTHING, NOTHING, NOTHING)
+        if key in contradicted:
+            figures = (say("not given"), *figures[1:])
+        elif key not in result.not_given:
+            least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
+            figures = (*wording.stated(quantity), least)
+        rows.append((wording.title_of(key, result), *figures, quantity.unit))
     least_squares = say("Least squares, named model") if result.averaged else say("Least squares")
-    figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("k"), least_squares))
-    heads: tuple[Text | doc.Column, ...] = (say("Error factor"), *figures, say("Unit"))
+    columns = map(doc.Column, (say("Estimate"), say("U"), say("k"), least_squares))
     skewed = wording.skewed_note(one for key, one in reported(result) if key not in result.not_given)
-    factors = doc.table(say("Error factors of the machine"), heads, rows, wording.SIGN, wording.UNCERTAINTY, *skewed)
+    factors = doc.table(say("Error factors of the machine"), (say("Error factor"), *columns, say("Unit")), rows, wording.SIGN,
+                        wording.UNCERTAINTY, *skewed)  # fmt: skip
     free = (block for combination in result.undetermined for block in _free_combination(result, combination))
     return section(say("Error factors"), factors, *free)
 
 
 def reported(result: Result) -> Iterator[tuple[tuple[str, str], Quantity]]:
-    """Every parameter of the named effects, by its key."""
     for effect in result.model.effects:
         yield from (((effect.name, name), quantity) for name, quantity in result.parameters[effect.name].items())
 
@@ -84,7 +97,7 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
     title, found = say("As found and as left"), job.as_found
     if found is None:
         return section(title)
-    date = say(", measured on {date}", date=day(found.job.date)) if found.job.date else NOTHING
+    date = say(", measured on {date}", date=messages.day(found.job.date)) if found.job.date else NOTHING
     told = say("As found: {job}{date}, before the machine was adjusted. As left: this measurement.",
                job=Verbatim(found.job.id), date=date)  # fmt: skip
     rows = []
@@ -101,10 +114,11 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
         for now in verdicts for before in found.stated if (before.by, before.name) == (now.by, now.name)
     )  # fmt: skip
     return section(
-        title, doc.Paragraph(told),
+        title,
+        doc.Paragraph(told),
         doc.table(say("The machine as found and as left"), (say("Quantity"), *figures, say("Unit")), rows, note),
         doc.table(say("Statements of conformity as found and as left"), heads, decided),
-    )  # fmt: skip
+    )
 
 
 def quantities_left(result: Result) -> list[Left]:
@@ -133,13 +147,14 @@ def tolerance_sections(result: Result) -> list[Section]:
     """Every parameter with a tolerance; none when the job sets none."""
     toleranced, title = tolerances_of(result), _TOLERANCES
     left_out = sorted(one.name.partition(".")[0] for one in toleranced if one.value is None)
-    free, aside = ([name for name in left_out if (name in result.free) == known] for known in (True, False))
-    unknown = say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(free)))
-    without = say(
-        "Not judged, since the laboratory set measurements aside, which are not in the estimate: {left_out}.",
-        left_out=listed(names(aside)),
+    free, aside = (
+        listed(names(name for name in left_out if (name in result.free) == known)) for known in (True, False)
     )
-    not_judged = tuple(text for text, of in ((unknown, free), (without, aside)) if of)
+    not_judged = holding(
+        (free, say("Not determined by this recording, so not judged: {left_out}.", left_out=free)),
+        (aside, say("Not judged, since the laboratory set measurements aside, which are not in the estimate: {left_out}.",
+                    left_out=aside)),
+    )  # fmt: skip
     judged = [one for one in toleranced if one.value is not None]
     if not judged:
         return [section(title, *map(doc.Paragraph, not_judged))] if left_out else []
@@ -151,16 +166,17 @@ def tolerance_sections(result: Result) -> list[Section]:
         rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _INSIDE[one.outcome]))
         part = quantity.times(1 / tolerance, unit("1"))
         ratios.append((part.value, *part.interval95))
-    figures = (doc.Column(head) for head in (say("Estimate"), say("U"), say("Tolerance")))
-    notes = (say("In or out: the whole 95 % interval is; otherwise open."), *not_judged)
-    out = [one.title for one in judged if one.outcome == "fail"]
+    out = listed([one.title for one in judged if one.outcome == "fail"])
     plot = tolerance_plot(
-        [one.title for one in judged], *map(list, zip(*ratios, strict=True)),
+        [one.title for one in judged],
+        *map(list, zip(*ratios, strict=True)),
         caption=say("Each parameter over its tolerance, with its 95 % interval."),
-        alternative=say("Out of tolerance: {out}.", out=listed(out)) if out else say("No parameter is out of tolerance."),
-    )  # fmt: skip
+        alternative=say("Out of tolerance: {out}.", out=out) if out else say("No parameter is out of tolerance."),
+    )
+    figures = map(doc.Column, (say("Estimate"), say("U"), say("Tolerance")))
     heads: tuple[Text | doc.Column, ...] = (say("Parameter"), *figures, say("Unit"), say("Verdict"))
-    return [section(title, plot, Table(say("Parameters and tolerances"), doc.columns(heads), tuple(rows), notes))]
+    inside = say("In or out: the whole 95 % interval is; otherwise open.")
+    return [section(title, plot, doc.table(say("Parameters and tolerances"), heads, rows, inside, *not_judged))]
 
 
 def summary(result: Result, warnings: Iterable[Text]) -> wording.Summary:
@@ -175,7 +191,9 @@ def summary(result: Result, warnings: Iterable[Text]) -> wording.Summary:
         wording.figure_row(wording.title_of(key, result), one, known=key not in result.not_given)
         for key, one in reported(result)
     ]
-    return wording.Summary(subject, day(facts.job.date), headlines(result), tuple(figures), warnings=tuple(warnings))
+    return wording.Summary(
+        subject, messages.day(facts.job.date), headlines(result), tuple(figures), warnings=tuple(warnings)
+    )
 
 
 class Stating(Protocol):
@@ -191,8 +209,11 @@ class Stating(Protocol):
 
 
 def headlines(result: Stating) -> tuple[wording.Headline, ...]:
-    """Every statement, for the end of a command."""
-    remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
+    remarks = [_remarks(statement) for statement in result.statements]
+    for one in tolerances_of(result):
+        value, U = rounded(one.value or 0.0, one.U or 0.0)
+        known = one.value is not None and one.U is not None
+        remarks.append([say("{value} ± {u} {unit}", value=value, u=U, unit=one.unit)] if known else list(one.missing))
     return tuple(
         wording.Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
         for one, told in zip(result.verdicts, remarks, strict=True)
@@ -209,13 +230,6 @@ def subject_of(one: Verdict) -> Text:
 
 def tolerances_of(result: Stating) -> list[Verdict]:
     return [one for one in result.verdicts if not one.by]
-
-
-def _tolerance_remarks(one: Verdict) -> list[Text]:
-    if one.value is None or one.U is None:
-        return list(one.missing)
-    value, U = rounded(one.value, one.U)
-    return [say("{value} ± {u} {unit}", value=value, u=U, unit=one.unit)]
 
 
 def _remarks(statement: Statement) -> list[Text]:
@@ -288,11 +302,9 @@ def _verdict(verdicts: Sequence[Verdict]) -> Text:
     if overall == "pass":
         many = say("Conforms: all {count} statements of conformity", count=count)
         return plural(count, one=say("Conforms"), many=many)
-    words = _WORDS.get(overall, wording.OUTCOME_WORDS.get(overall, say("Not decided")))
-    if count == 1:
-        return words
-    alike = sum(one.outcome == overall for one in verdicts)
-    return say("{words}: {alike} of {count} statements of conformity", words=words, alike=alike, count=count)
+    words, alike = _WORDS.get(overall, say("Not decided")), sum(one.outcome == overall for one in verdicts)
+    several = say("{words}: {alike} of {count} statements of conformity", words=words, alike=alike, count=count)
+    return words if count == 1 else several
 
 
 def _row(one: Verdict, *, signed: bool) -> Text:

@@ -144,24 +144,13 @@ LASTING = StandardDiffPolicy([_catalogue, _store], DEFAULT_DIFF_POLICY.form_rule
 """For what stands behind the last signature: evidence and time stamps, for which no signer vouches."""
 
 _STAMP = {
-    "/Type": r"/DocTimeStamp",
-    "/Filter": r"/Adobe\.PPKLite",
-    "/SubFilter": r"/ETSI\.RFC3161",
-    "/Contents": r".*",
-    "/ByteRange": r"\[.*\]",
-    "/M": r"D:[0-9Z+'-]*",
-}
+    "/Type": r"/DocTimeStamp", "/Filter": r"/Adobe\.PPKLite", "/SubFilter": r"/ETSI\.RFC3161", "/Contents": r".*",
+    "/ByteRange": r"\[.*\]", "/M": r"D:[0-9Z+'-]*",
+}  # fmt: skip
 _WIDGET = {
-    "/FT": "/Sig",
-    "/T": r"[A-Za-z]+\d*",
-    "/Type": "/Annot",
-    "/Subtype": "/Widget",
-    "/F": r"\d+",
-    "/Rect": r".*",
-    "/P": r".*",
-    "/TU": "Timestamp",
-    "/V": r".*",
-}
+    "/FT": "/Sig", "/T": r"[A-Za-z]+\d*", "/Type": "/Annot", "/Subtype": "/Widget", "/F": r"\d+", "/Rect": r".*",
+    "/P": r".*", "/TU": "Timestamp", "/V": r".*",
+}  # fmt: skip
 """What a time stamp of the document and its unseen field state, and nothing that could be read (ISO 32000-2, 12.8.5)."""
 
 

@@ -51,8 +51,6 @@ _ERRORS = 6.0  # standard errors of a Monte Carlo that two of it may differ by, 
 
 @dataclass(frozen=True)
 class Again:
-    """What was computed again."""
-
     files: Mapping[str, bytes]  # all that the command writes, by name, without the PDF
     pdf: bytes | None = None  # with the files attached that the given one has; ``None`` where the program is another
     why_no_pdf: str = ""

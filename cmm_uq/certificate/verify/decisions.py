@@ -15,14 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.decision import (
-    PriorKnowledge,
-    decide,
-    global_risks,
-    largest_risk,
-    largest_share,
-    least_probability,
-)
+from cmm_uq.analysis.conformity import decision as deciding
 from cmm_uq.analysis.conformity.limits import Limits, accepted_by, outcome_of
 from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.analysis.conformity.statement import Decided, Statement
@@ -48,7 +41,6 @@ Ends = tuple[float | None, float | None]  # smallest and largest value that a ru
 
 
 def check_decisions(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
-    """Keep every decision that does not follow."""
     for i, entry in enumerate(data.get("conformity") or ()):
         path = f"conformity[{i}]"
         try:
@@ -108,17 +100,17 @@ def _decided_again(errors: list[Any], rule: Rule, prior: Any, *, unstated: bool)
 def _decided(error: Mapping[str, Any], rule: Rule, prior: Any, *, signed: bool, unstated: bool) -> Decided:
     """What follows; a nonconformity that would be proved were the uncertainty whole may be undecided where it is not."""
     value, u, limit = error["error_um"], error["u_um"], error["limit_um"]
-    decision = decide(value, u, limit, rule, signed=signed, prior=_known(prior, limit))
+    decision = deciding.decide(value, u, limit, rule, signed=signed, prior=_known(prior, limit))
     if unstated and (decision.outcome, error["outcome"]) == ("fail", "undecided"):
         decision = replace(decision, outcome="undecided")
     return Decided(value, u, limit, decision, error["measurement"], error["repeat"], error["length_mm"],
                    standing=error["standing"], set_aside=error.get("set_aside", False))  # fmt: skip
 
 
-def _known(prior: Any, limit: float) -> PriorKnowledge | None:
+def _known(prior: Any, limit: float) -> deciding.PriorKnowledge | None:
     if prior is None:
         return None
-    return PriorKnowledge(prior["mean_um"], prior["sd_um"] or (prior["share_of_limit"] or 0.0) * limit)
+    return deciding.PriorKnowledge(prior["mean_um"], prior["sd_um"] or (prior["share_of_limit"] or 0.0) * limit)
 
 
 def _error(error: Mapping[str, Any], decided: Decided, entry: Mapping[str, Any]) -> Iterator[Wrong]:
@@ -154,7 +146,6 @@ def _limit(mpe: Any, length: float | None) -> float | None:
 
 
 def _whole(entry: Mapping[str, Any], decided: list[Decided], signed: bool, prior: Any) -> Iterator[Wrong]:
-    """What the statement as a whole says."""
     missing, outside = (tuple(map(Verbatim, entry.get(key, ()))) for key in ("missing", "outside"))
     facts = table.ConformityFacts.model_construct(standard=entry["standard"])
     whole = Statement(facts, entry["characteristic"], NOTHING, NOTHING, tuple(decided), missing, (), signed,
@@ -194,7 +185,7 @@ def _risks(stated: Any, named: Decided, signed: bool, prior: Any) -> Iterator[Wr
         return
     band = named.decision.guard_band
     accepted = -20.0 * named.u_um if band is None else named.limit_um - band
-    should = global_risks(accepted, named.limit_um, named.u_um, known, signed=signed)
+    should = deciding.global_risks(accepted, named.limit_um, named.u_um, known, signed=signed)
     for key, value in (("consumer", should.consumer), ("producer", should.producer)):
         if not isclose(stated[key], value, rel_tol=1e-5, abs_tol=1e-12):
             yield f".global_risks.{key}", "does not follow from the prior", stated[key], f"{value:.10g}"
@@ -230,7 +221,6 @@ class _StatedLimits(Limits):
 
 
 def check_part_decisions(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
-    """Keep every decision on a part that does not follow."""
     whole, wrong = data["decision"], partial(inquiry.wrong, "decisions", file)
     rule, prior, decisions = rule_of(whole["rule"]), whole["prior"], []
     for i, each in enumerate(data["characteristics"]):
@@ -278,7 +268,9 @@ def _accepted(each: Mapping[str, Any], rule: Rule) -> Iterator[Wrong]:
     for end, limit, side in ends:
         if end is not None and limit is not None and side * (end - limit) < -1e-9 * max(abs(end), abs(limit)):
             yield "limits.accepted", "reaches beyond a limit", stated, [limits["lower"], limits["upper"]]
-    by_draws = any(of(rule) is not None for of in (largest_risk, least_probability, largest_share))
+    by_draws = any(
+        of(rule) is not None for of in (deciding.largest_risk, deciding.least_probability, deciding.largest_share)
+    )
     if is_zone(each) or by_draws or not u:
         return
     narrow, wide = (accepted_by(_limits(each, u * (1 + side * DRAWN)), rule) for side in (1, -1))
@@ -313,7 +305,7 @@ def _decision(each: Mapping[str, Any], rule: Rule, *, known: bool) -> Iterator[W
     if decision["outcome"] not in possible and not tenth_digit_decides:
         should = " or ".join(sorted(possible))
         yield "decision.outcome", "does not follow from value, u, limits and rule", decision["outcome"], should
-    risk, least = largest_risk(rule), least_probability(rule)
+    risk, least = deciding.largest_risk(rule), deciding.least_probability(rule)
     risk = 1 - least if risk is None and least is not None else risk
     if risk is not None and _limits(each, u).inside(value):
         inner = zip(ends or (), (1, -1), strict=False)

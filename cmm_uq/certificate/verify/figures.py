@@ -43,7 +43,6 @@ def quantities(data: Any, path: str = "", *, inner: bool = False) -> Iterator[tu
 
 
 def check_figures(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
-    """Keep every figure that another one contradicts."""
     wrong = partial(inquiry.wrong, "figures", file)
     for path, quantity in quantities(data):
         inquiry.looked("figures")
@@ -319,7 +318,6 @@ def check_part_job(
 
 
 def check_standing(inquiry: Inquiry, should: Mapping[str, Any], data: Mapping[str, Any], file: str) -> None:
-    """Keep what the machine's certificate says otherwise."""
     said, problem = data["machine"], "is not what the machine's certificate says"
     for key in _OF_THE_MACHINE:
         inquiry.compare("inputs", file, f"machine.{key}", problem, said[key], should[key])

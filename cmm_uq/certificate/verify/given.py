@@ -291,8 +291,6 @@ LONGEST = 160  # characters of what stands somewhere, as it is shown
 
 @dataclass(frozen=True)
 class VerificationFinding:
-    """Something that is not as it must be."""
-
     check: str  # of CHECKS
     file: str
     place: str  # page, JSON path, XPath, attachment, byte; empty for the file as a whole
@@ -308,8 +306,6 @@ class VerificationFinding:
 
 @dataclass(frozen=True)
 class Unchecked:
-    """Something that was not checked, and why."""
-
     what: str
     why: str
 
@@ -370,13 +366,11 @@ class Inquiry:
 
     @property
     def word(self) -> Word:
-        """The verdict."""
         if self.findings:
             return "NOT VERIFIED"
         return "NOT WHOLLY CHECKED" if self.unchecked else "VERIFIED"
 
     def as_data(self) -> dict[str, Any]:
-        """For JSON."""
         return {
             "verdict": self.word,
             "findings": [{key: text or None for key, text in asdict(finding).items()} for finding in self.findings],

@@ -39,8 +39,6 @@ _UNTOLD = frozenset({"/Type", "/Length", "/Filter"})
 
 @dataclass(frozen=True)
 class Attachment:
-    """A file inside a PDF."""
-
     name: str
     content: bytes
     relationship: str  # to the document (ISO 19005-3): ``Source`` or ``Data``
@@ -48,8 +46,6 @@ class Attachment:
 
 @dataclass
 class PdfFile:
-    """What a PDF holds."""
-
     content: bytes
     attachments: list[Attachment] = field(default_factory=list)
     information: dict[str, str] = field(default_factory=dict)  # title, dates and the like, as the file says
@@ -293,8 +289,6 @@ def read_html(content: bytes, where: str) -> HtmlPage:
 
 
 class _Reader(HTMLParser):
-    """Follows the tags of a page."""
-
     def __init__(self, where: str) -> None:
         super().__init__(convert_charrefs=True)
         self.page, self._where, self._open = HtmlPage(), where, list[str]()

@@ -29,7 +29,6 @@ Difference = tuple[str, str, str]  # path in a PDF or XPath, what stands there, 
 
 
 def first_difference(a: Sequence[object], b: Sequence[object]) -> int:
-    """Where two sequences begin to differ."""
     return next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
 
 

@@ -145,7 +145,7 @@ class Conductor:
         if waiting := [name for name, soak in self._soaks.items() if soak.unsettled]:
             head = say("{head}; WAIT, not settled: {columns}", head=head, columns=commas(names(waiting)))
         instruments: list[Text] = []
-        for name in dict.fromkeys((*self.recorder.names, *self.recorder.counts)):
+        for name in dict.fromkeys((*self.recorder.declared, *self.recorder.counts)):
             count = say("{name}: {count} readings", name=Verbatim(name), count=self.recorder.counts.get(name, 0))
             ill = self.recorder.ill.get(name)
             instruments.append(count if ill is None else say("{count}, {why}", count=count, why=ill))

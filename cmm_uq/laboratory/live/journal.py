@@ -59,7 +59,6 @@ class JournalLine(NamedTuple):
 
 
 def lines_in(path: Path) -> Iterator[JournalLine]:
-    """Every line of a journal, one at a time."""
     check_file(path, "Put a copy of the file in its place")
     with path.open("rb") as file:
         for number, line in enumerate(file, 1):
@@ -122,16 +121,16 @@ class RecordingJournal:
         line = line_of(record)
         if self._bytes + len(line) > MOST_WAITING:
             raise OutputError(
-                f"the disk has been full for so long that {self._bytes} bytes wait in memory", where=str(self.path),
+                f"the disk has been full for so long that {self._bytes} bytes wait in memory",
+                where=str(self.path),
                 fix="Make room, then go on; what was shown as accepted is kept",
-            )  # fmt: skip
+            )
         self.next += 1
         self._waiting.append(line)
         self._bytes += len(line)
         return record
 
     def commit(self) -> None:
-        """Put everything that waits on the disk."""
         if not self._waiting:
             return
         text = b"".join(self._waiting)
@@ -147,8 +146,9 @@ class RecordingJournal:
                 raise refused("cannot be written", error, self.path) from None
             raise NoRoomError(
                 f"there is no room on the disk ({error.strerror}): {len(self._waiting)} records wait in memory, not accepted",
-                where=str(self.path), fix="Make room; they are written as soon as there is some",
-            ) from None  # fmt: skip
+                where=str(self.path),
+                fix="Make room; they are written as soon as there is some",
+            ) from None
         self.written += len(text)
         self._waiting.clear()
         self._bytes = 0

@@ -267,8 +267,9 @@ def _against(found: Predicted, own: Ints) -> tuple[tuple[Text, ...], Text | None
         return (shown,), None
     return (shown,), say(
         "it lies {off} µm from what all else says, and chance does that once in {times:.0f} set-ups: measure it once more",
-        off=signed(value - expected, "+.1f"), times=min(1 / max(chance, 1e-6), 1e6),
-    )  # fmt: skip
+        off=signed(value - expected, "+.1f"),
+        times=min(1 / max(chance, 1e-6), 1e6),
+    )
 
 
 def _exchanged(step: PlannedPoint, steps: Sequence[PlannedPoint], taken: Mapping[Place, Point]) -> int | None:

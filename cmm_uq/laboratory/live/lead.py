@@ -63,7 +63,6 @@ class Lead:
 
     @cached_property
     def runs(self) -> tuple[Run, ...]:
-        """Every planned measurement and repeat, in order."""
         return tuple(self.plan.run_of(group) for group in range(len(self.plan.rows_of_groups)))
 
     def all_runs(self, story: Story) -> list[Run]:
@@ -94,7 +93,6 @@ class Lead:
         return self._steps[run]
 
     def missing(self, run: Run, story: Story) -> list[PlannedPoint]:
-        """Points of it that are still to be measured."""
         return self._left(run, story.by_place)
 
     def next(self, story: Story, begin_with: Run | None = None) -> PlannedPoint | None:

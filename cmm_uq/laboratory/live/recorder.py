@@ -67,10 +67,10 @@ class Recorder:
         self, journals: Journals, sources: Sequence[DeclaredSource], *, max_gap_s: float, clock: Clock
     ) -> None:
         self._journals, self._clock, self._max_gap_s = journals, clock, max_gap_s
-        self._declared = {source.name: source for source in sources}
+        self.declared = {source.name: source for source in sources}  # by the job
         self._came: list[Reading] = []  # since the last commit
         self._identities: dict[str, Identity] = {}
-        self._open: list[int] = []  # records of points that not every stream has answered
+        self.unsettled: list[int] = []  # records of points that not every stream has answered
         start = journals.story.session.start
         self._between = start.utc_ns - start.monotonic_ns
         self.streams: dict[str, Stream] = {}  # of readings that come by themselves, by column
@@ -92,21 +92,11 @@ class Recorder:
     def now(self) -> Moment:
         return Moment.now(self._clock)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the instruments that the job declares."""
-        return tuple(self._declared)
-
-    @property
-    def unsettled(self) -> int:
-        """Points whose streams have not answered yet."""
-        return len(self._open)
-
     def identified(self, identity: Identity) -> None:
         """Which instrument a source is; written down whenever it says something new."""
         if self._identities.get(identity.name) != identity:
             self._identities[identity.name] = identity
-            declared = self._declared.get(identity.name)
+            declared = self.declared.get(identity.name)
             more = {} if declared is None else {"columns": dict(declared.values), "latency_ms": declared.latency_ms}
             self.say("identity", **vars(identity), **more)
 
@@ -131,7 +121,7 @@ class Recorder:
     ) -> None:
         """Write a point down with what belongs to it; it counts once :meth:`commit` has returned ``True``."""
         data = {"place": list(place), "columns": dict(columns), "moment": [moment.utc_ns, moment.monotonic_ns]}
-        self._open.append(self._journals.say("point", {**data, "how": how, **(of or {})}, self.now).number)
+        self.unsettled.append(self._journals.say("point", {**data, "how": how, **(of or {})}, self.now).number)
 
     def say(self, kind: str, **data: Any) -> None:
         """Write down what else happened: a note, a pause, a set-up that is left out, points that are taken back."""
@@ -167,16 +157,16 @@ class Recorder:
             self.told.append(say(
                 "the computer's clock was moved by {s:.3g} s, or it slept; times go on by the one that nobody sets", s=by_s
             ))  # fmt: skip
-        self._open = [number for number in self._open if not self._settle(number, now.monotonic_ns)]
+        self.unsettled = [number for number in self.unsettled if not self._settle(number, now.monotonic_ns)]
         for stream in self.streams.values():
             stream.forget(now.monotonic_ns)
         return self.commit()
 
     def finish(self) -> None:
         """Join what is left, now that nothing more will come."""
-        for number in self._open:
+        for number in self.unsettled:
             self._settle(number, None)
-        self._open.clear()
+        self.unsettled.clear()
         for source, count in self.unasked.items():
             self.say("unasked", source=source, count=count)
 
@@ -195,11 +185,11 @@ class Recorder:
 
     def column(self, source: str, quantity: str) -> str:
         """Column of the recording that a quantity of an instrument goes into."""
-        return self._declared[source].values.get(quantity, quantity) if source in self._declared else quantity
+        return self.declared[source].values.get(quantity, quantity) if source in self.declared else quantity
 
     def latency_ns(self, source: str) -> int:
         """From the measurement to the arrival of its last byte."""
-        declared = self._declared.get(source)
+        declared = self.declared.get(source)
         return round(declared.latency_ms * 1e6) if declared else 0
 
     def _reading(self, reading: Reading) -> Reading | None:
@@ -258,7 +248,7 @@ class Recorder:
         for point in left:
             moment_ns = point.moment.monotonic_ns
             streams = {(one.name, quantity): self._new_stream(one.name, quantity)
-                       for one in self._declared.values() for quantity in one.values}  # fmt: skip
+                       for one in self.declared.values() for quantity in one.values}  # fmt: skip
             path = self._journals.folder / STREAMS.format(point.session)
             for reading in _about(path, moment_ns, round(3e9 * self._max_gap_s)):
                 for quantity, value in reading.values.items():

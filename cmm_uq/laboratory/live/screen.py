@@ -21,17 +21,12 @@ from cmm_uq.laboratory.live.lead import Lead, PlannedPoint
 from cmm_uq.laboratory.live.story import NS
 
 WORDS = {
-    "undo": "takes the last point back: undo REASON",
-    "repeat": "measures the last set-up once more",
-    "skip": "leaves the set-up out: skip REASON",
-    "go": "goes on with a measurement: go 5",
-    "note": "writes something down: note TEXT",
-    "clear": "lets a machine go on after an error that you have looked at",
-    "pause": "stops taking points: pause REASON",
-    "resume": "goes on taking points",
-    "help": "says all this",
+    "undo": "takes the last point back: undo REASON", "repeat": "measures the last set-up once more",
+    "skip": "leaves the set-up out: skip REASON", "go": "goes on with a measurement: go 5",
+    "note": "writes something down: note TEXT", "clear": "lets a machine go on after an error that you have looked at",
+    "pause": "stops taking points: pause REASON", "resume": "goes on taking points", "help": "says all this",
     "quit": "ends; the same command goes on later",
-}
+}  # fmt: skip
 """What each does."""
 
 WITH_TEXT = ("undo", "skip", "note")  # those that say nothing without a text

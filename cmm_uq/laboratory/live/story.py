@@ -177,7 +177,6 @@ class Story:
 
     @property
     def session(self) -> Session:
-        """The one that is running, or was last."""
         return self.sessions[-1]
 
     @property
@@ -266,12 +265,10 @@ class Journals:
         return record
 
     def commit(self) -> None:
-        """Put both on the disk."""
         self.events.commit()
         self.streams.commit()
 
     def close(self) -> None:
-        """Give files and lock back."""
         self.events.close()
         self.streams.close()
         with contextlib.suppress(OSError):
@@ -279,7 +276,6 @@ class Journals:
 
 
 def sessions_in(folder: Path) -> list[Path]:
-    """Journals of events of all sessions, in order."""
     try:
         names = sorted(path.name for path in folder.iterdir() if _EVENTS.fullmatch(path.name))
     except OSError:

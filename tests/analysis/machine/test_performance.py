@@ -21,7 +21,7 @@ from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.sections.performance import performance, returning_figures
+from cmm_uq.certificate.sections.conformity import performance, returning_figures
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.noise import noise_of

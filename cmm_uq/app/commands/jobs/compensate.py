@@ -26,7 +26,7 @@ from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import FurtherCertificates, further_data
 from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.sections.read_axes import readings_data, readings_warnings
+from cmm_uq.certificate.sections.regions import readings_data, readings_warnings
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.beside import log_of

@@ -32,7 +32,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.certificate.clauses import draft
 from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
-from cmm_uq.certificate.sections.read_axes import readings_warnings
+from cmm_uq.certificate.sections.regions import readings_warnings
 from cmm_uq.certificate.verify.given import CHECKS, Given, given_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob

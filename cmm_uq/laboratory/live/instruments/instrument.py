@@ -280,7 +280,6 @@ class LiveInstrument:
 def open_source(
     declared: DeclaredSource, *, clock: source.Clock = source.SYSTEM, folder: Path = Path()
 ) -> source.LiveSource:
-    """The source that a job declares, with its port open."""
     profile = profile_of_source(declared, folder)
     identity = source.Identity(
         declared.name, profile.maker or None, profile.model or None, declared.serial or None,

@@ -158,8 +158,6 @@ def number_text(value: float) -> str:
 
 
 class FaultError(Exception):
-    """The server answered a command with an error."""
-
     def __init__(self, fault: Fault) -> None:
         self.fault = fault
         super().__init__(str(fault))

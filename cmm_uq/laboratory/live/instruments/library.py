@@ -46,7 +46,6 @@ def _ready(name: str) -> ProfileFile:
 
 
 def profile_of(content: bytes, path: Path) -> ProfileFile:
-    """A profile of a file's bytes."""
     found = checked(content, path, ProfileFile, most_word=TEXT.most)
     check_profile(found, str(path))
     return found
@@ -209,8 +208,6 @@ def beside(event: Event) -> tuple[str, str]:
 
 @dataclass
 class Trial:
-    """What came of an instrument, counted."""
-
     profile: ProfileFile
     port: str
     messages: int = 0

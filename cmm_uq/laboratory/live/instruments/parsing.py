@@ -19,8 +19,6 @@ from cmm_uq.laboratory.live.instruments import profile as profiles
 
 @dataclass(frozen=True)
 class FramedMessage:
-    """Bytes that belong together."""
-
     raw: bytes
     body: bytes  # without terminator, first and last byte
     whole: bool = True  # whether it is a message; else bytes between messages, or a message without its end
@@ -50,7 +48,6 @@ class Framer:
 
     @property
     def waiting(self) -> bytes:
-        """What waits for its end."""
         return bytes(self._waiting)
 
     def _next(self) -> FramedMessage | None:

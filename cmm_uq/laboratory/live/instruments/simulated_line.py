@@ -241,23 +241,6 @@ class Barometer(Vaisala):
     letters = ("P",)
 
 
-class PositionDisplay(Speaker):
-    """ND 287: ESC commands, STX before what is asked for, NAK for what is not known; A0200 is without a decimal point."""
-
-    usual = (-12345.6789,)
-
-    def answer(self, command: str) -> bytes:
-        if self.ill:
-            return b"\x15"
-        if command == "\x1bA0000":
-            return b"\x02ND-287    \r\n646118-01 \r\nV1-01     \r\n"
-        if command in ("\x1bA0100", "\x1bA0200"):
-            value = self.readings[0]
-            shown = f"{value:+.4f}" if command.endswith("0100") else f"{round(value * 1e4):+010d}"
-            return f"\x02{shown}\r\n".encode()
-        return b"\x15"
-
-
 class Readout1502(Speaker):
     """Fluke 1502A: T, DU, SA, *IDN?; it echoes until DU=H."""
 
@@ -361,13 +344,18 @@ class Answering(Speaker):
     def answer(self, command: str) -> bytes:
         fitting = (said for known, said in self._replies.items() if re.fullmatch(known, command))
         said = next(fitting, self._otherwise)[self.ill]
-        return said.format(*self.readings, command=command[:2]).encode("latin-1")
+        steps = round(1e4 * self.readings[0])  # without a decimal point
+        return said.format(*self.readings, command=command[:2], steps=steps).encode("latin-1")
 
 
 _FEW: Mapping[str, tuple[Any, ...]] = MappingProxyType({
     # each input by its name, dashes where its probe is open
     "asl-f250": ((20.013, 20.104), {f"M{key}": (f"{name} {{{n}:.3f}} C\r\n", f"{name} ------\r\n")
                                     for n, (key, name) in enumerate((("I", "A"), ("J", "B")))}),
+    # ESC commands, STX before what is asked for, NAK for what is not known
+    "heidenhain-nd287": ((-12345.6789,), {
+        "\x1bA0000": ("\x02ND-287    \r\n646118-01 \r\nV1-01     \r\n", "\x15"),
+        "\x1bA0100": ("\x02{0:+.4f}\r\n", "\x15"), "\x1bA0200": ("\x02{steps:+010d}\r\n", "\x15")}, ("\x15",) * 2),
     # SCPI, a bare number for each channel
     "fluke-1529": ((20.0132, 20.1044, 19.9871, 21.0), {
         **{rf"(?i)(FETCH?|READ|MEAS)\? ?{n + 1}": (f"{{{n}:.4f}}\r\n", "9.9E37\r\n") for n in range(4)},
@@ -390,9 +378,9 @@ _FEW: Mapping[str, tuple[Any, ...]] = MappingProxyType({
 })  # fmt: skip
 
 SPEAKERS: Mapping[str, Callable[[], Speaker]] = MappingProxyType({
-    "vaisala-ptu300": Vaisala, "vaisala-ptb330": Barometer, "heidenhain-nd287": PositionDisplay,
-    "fluke-1502a": Readout1502, "isotech-millik": MilliK, "mitutoyo-digimatic": Digimatic, "leica-geocom": TotalStation,
-    "pico-pt104": Pt104, "thermocouple-logger-11": Thermocouples, "line-logger": Lines,
+    "vaisala-ptu300": Vaisala, "vaisala-ptb330": Barometer, "fluke-1502a": Readout1502, "isotech-millik": MilliK,
+    "mitutoyo-digimatic": Digimatic, "leica-geocom": TotalStation, "thermocouple-logger-11": Thermocouples,
+    "line-logger": Lines, "pico-pt104": Pt104,
     **{name: partial(Answering, *said) for name, said in _FEW.items()},
 })  # fmt: skip
 """By the name of the profile."""

@@ -90,8 +90,6 @@ Event = Reading | Gap | Returned
 
 
 class LiveSource(Protocol):
-    """An instrument, live."""
-
     name: str
 
     def identity(self) -> Identity:
@@ -126,8 +124,6 @@ class PortLostError(Exception):
 
 
 class Port(Protocol):
-    """An open port."""
-
     def read(self, *, wait: bool = True) -> bytes:
         """What came, as soon as anything comes; empty where nothing did within :data:`TICK_S`, or at once without waiting."""
 
