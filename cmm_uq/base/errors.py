@@ -92,6 +92,9 @@ class Gathered:
         if len(self.problems) < MOST_GATHERED:
             self.problems += [error, *error.also]
 
+    def tell(self, problem: str, *, where: str | None = None, fix: str | None = None) -> None:
+        self.add(CmmUqError(problem, where=where, fix=fix))
+
     def refuse(self) -> None:
         """Raise the first error with the others in it; nothing where there is none."""
         if self.problems:

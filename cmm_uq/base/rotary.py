@@ -92,8 +92,6 @@ def _rotated(vectors: Floats, about: int, angle: Floats) -> Floats:
     i, j = (about + 1) % 3, (about + 2) % 3
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]
     found = np.array(np.broadcast_to(vectors, (len(angle), *vectors.shape[1:])))
-    found[:, i], found[:, j] = (
-        cosine * vectors[:, i] - sine * vectors[:, j],
-        sine * vectors[:, i] + cosine * vectors[:, j],
-    )
+    found[:, i] = cosine * vectors[:, i] - sine * vectors[:, j]
+    found[:, j] = sine * vectors[:, i] + cosine * vectors[:, j]
     return found

@@ -34,10 +34,9 @@ from cmm_uq.jobs.tables.conformity import (
     standards_in,
     uncertainty_missing,
 )
-from cmm_uq.jobs.tables.effect import EffectFacts
 from cmm_uq.jobs.tables.identification import MEASURED, DerivedFrom, Identification, Laboratory, Origin
 from cmm_uq.jobs.tables.machine import MachineFacts, ProbeFacts
-from cmm_uq.jobs.tables.plan import AcquireFacts, PlanFacts, ProveFacts
+from cmm_uq.jobs.tables.plan import AcquireFacts, EffectFacts, PlanFacts, ProveFacts
 
 Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]  # A permissible size of an effect in its own unit
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -23,30 +24,24 @@ from cmm_uq.jobs.importing.format import HEAD, Recognition
 from cmm_uq.jobs.importing.recording import read_recording_file
 from cmm_uq.jobs.job import NO_DATE, Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
+from cmm_uq.jobs.machines import in_coordinates, machine_of
 from cmm_uq.jobs.recording import compared
 from cmm_uq.jobs.recording.beside import LOG, SHORT_GAUGE, ShortGauge, log_of, short_gauge_of, with_logged
 from cmm_uq.jobs.recording.compared import EXPANDED, OF_POINTS, reference_file
-from cmm_uq.jobs.recording.machines import in_coordinates, machine_of
 from cmm_uq.jobs.reports import as_found_of, calibration_file, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
+from cmm_uq.jobs.tables import identification
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import ClausesForm, ConformityFacts, Standards, needed, uncertainty_missing
-from cmm_uq.jobs.tables.identification import (
-    COMPENSATED,
-    REPLACED,
-    SIMULATED,
-    altered,
-    check_examples,
-    check_mark,
-    is_planned,
-)
+from cmm_uq.jobs.tables.identification import REPLACED, altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.tables.machine import FurtherFacts, MachineFacts
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.certified import CertifiedValues
 
 WHOLE = (".pdf", ".xml")  # a certificate with its inputs inside
-CERTIFICATES = tuple(f"certificate{origin}.pdf" for origin in ("", f"-{SIMULATED}", f"-{COMPENSATED}"))
+_ORIGINS = ("", f"-{identification.SIMULATED}", f"-{identification.COMPENSATED}")
+CERTIFICATES = tuple(f"certificate{origin}.pdf" for origin in _ORIGINS)
 PART = "part"  # the table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`
 
 
@@ -69,7 +64,7 @@ class Nameable:
 
 def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
     """Read and check a job; one still to be measured has no points, where it need not be ``recorded``."""
-    return _read(_in_folder(folder), nameable, recorded=recorded)
+    return _read(in_folder(folder), nameable, recorded=recorded)
 
 
 def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = True) -> Job:
@@ -77,22 +72,16 @@ def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = T
     return _read(FilesInMemory(files), nameable, recorded=recorded)
 
 
-def job_toml(folder: Path) -> Path:
-    """job.toml of a job by its folder, or by its own name; what is to be done with another file is said."""
-    if folder.suffix == ".toml":
-        return folder
-    if folder.suffix.lower() in (".pdf", ".xml") and folder.is_file():
-        fix = "cmm-uq verify FILE checks it, cmm-uq read FILE prints a digital one"
-        raise CmmUqError("is a certificate or the like, not a job", where=str(folder), fix=fix)
-    if folder.is_file():
+def in_folder(folder: Path) -> FilesInFolder:
+    """Files of a job by its folder, or by its job.toml, once what a process that is no more left there is settled."""
+    if folder.suffix != ".toml" and folder.is_file():
         problem = "is an export, not a job: which artefact and which limits, it does not say"
         fix = "cmm-uq new KIND my-job --from FILE makes a job of it, cmm-uq import FILE shows how it is read"
+        if folder.suffix.lower() in WHOLE:
+            problem = "is a certificate or the like, not a job"
+            fix = "cmm-uq verify FILE checks it, cmm-uq read FILE prints a digital one"
         raise CmmUqError(problem, where=str(folder), fix=fix)
-    return folder / "job.toml"
-
-
-def _in_folder(folder: Path) -> FilesInFolder:
-    path = job_toml(folder)
+    path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
     return FilesInFolder(path)
 
@@ -110,14 +99,12 @@ def _refuse_unfit_earlier(facts: JobFile, path: Path) -> None:
     """Refuse an earlier recording of a kind that compares none, and one that is later."""
     recorded, when = facts.recording, facts.job.date
     if recorded.earlier is not None and not facts.artefact.with_earlier:
-        kind = facts.artefact.kind
-        raise CmmUqError(f"earlier compares two recordings at two dates, which a job of kind {kind!r} has not",
-                         where=f"{path}: [recording] earlier", fix="Leave it out")  # fmt: skip
+        problem = f"earlier compares two recordings at two dates, which a job of kind {facts.artefact.kind!r} has not"
+        raise CmmUqError(problem, where=f"{path}: [recording] earlier", fix="Leave it out")
     if recorded.earlier_date is not None and NO_DATE != when < recorded.earlier_date:
         problem = f"{recorded.earlier_date} lies after the recording's date, {when}"
-        raise CmmUqError(
-            problem, where=f"{path}: [recording] earlier_date", fix="Exchange both recordings, or mend a date"
-        )
+        fix = "Exchange both recordings, or mend a date"
+        raise CmmUqError(problem, where=f"{path}: [recording] earlier_date", fix=fix)
 
 
 def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
@@ -203,16 +190,14 @@ def _forms(
         path = folder / wish.clauses
         form = forms[wish.clauses] = checked(inputs[wish.clauses], path, ClausesForm)
         if form.standard != wish.standard:
-            raise CmmUqError(
-                f"is the form of {form.standard}, and [[conformity]] {i} states {wish.standard}", where=str(path),
-                fix=f'cmm-uq standards "{wish.standard}" --form FILE writes the one that belongs to it',
-            )  # fmt: skip
+            problem = f"is the form of {form.standard}, and [[conformity]] {i} states {wish.standard}"
+            fix = f'cmm-uq standards "{wish.standard}" --form FILE writes the one that belongs to it'
+            raise CmmUqError(problem, where=str(path), fix=fix)
         asked = standards.named(wish.standard)
         known = () if asked is None else asked.clause_names
-        for name in form.clauses:
-            if name not in known:
-                raise CmmUqError(f"{wish.standard} has no clause {name!r} here", where=f"{path}: [clauses.{name}]",
-                                 fix=suggestion(name, known))  # fmt: skip
+        for name in (name for name in form.clauses if name not in known):
+            problem = f"{wish.standard} has no clause {name!r} here"
+            raise CmmUqError(problem, where=f"{path}: [clauses.{name}]", fix=suggestion(name, known))
     return forms
 
 
@@ -288,7 +273,7 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
 
 def read_machine(folder: Path, nameable: Nameable) -> Job:
     """A job for its machine alone: job.toml, error maps and temperature log, whatever its recording is."""
-    source = _in_folder(folder)
+    source = in_folder(folder)
     content, facts, _ = _facts(source, nameable)
     maps, logs, calibrations = _of_the_machine(facts.machine)
     check_distinct([*maps, *logs, *calibrations], str(source.toml))
@@ -303,15 +288,12 @@ def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, Certif
     says: list[CertifiedValues] = []
 
     def beside(data: dict[str, Any]) -> dict[str, Any]:
-        found = _certified(data, source, nameable)
-        if found is None:
+        if (found := _certified(data, source, nameable)) is None:
             return data
         says.append(found)
         return {**data, "artefact": found.beside(data["artefact"])}
 
-    def model_for(data: dict[str, Any]) -> type[JobFile]:
-        return _model_for(data, nameable, source.toml)
-
+    model_for = partial(_model_for, nameable=nameable, path=source.toml)
     facts = checked(content, source.toml, model_for, nameable.standards, beside=beside)
     places = says[0].places if says else None
     if places is not None and isinstance(facts.artefact, ReferencedFacts):
@@ -350,14 +332,11 @@ def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str
 
 def further_named(further: Iterable[FurtherFacts], source: JobFiles) -> tuple[str, ...]:
     """Files of further certificates, which must have their recordings inside; of a folder that which a report wrote."""
-
-    def file(name: str) -> str:
-        if name.lower().endswith(WHOLE):
-            return name
-        each = [f"{name}/{one}" for one in CERTIFICATES]
-        return next((one for one in each if source.has(one, written=True)), each[0])
-
-    return tuple(file(one.certificate.removesuffix("/")) for one in further)
+    found = []
+    for name in (one.certificate.removesuffix("/") for one in further):
+        each = [name] if name.lower().endswith(WHOLE) else [f"{name}/{one}" for one in CERTIFICATES]
+        found.append(next((one for one in each if len(each) == 1 or source.has(one, written=True)), each[0]))
+    return tuple(found)
 
 
 def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[JobFile]:

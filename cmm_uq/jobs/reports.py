@@ -161,15 +161,11 @@ class EarlierNoise:
 
 def noise_found(content: bytes, where: str) -> EarlierNoise:
     """``[plan] noise_from``: the noise of an earlier recording by the results.json of its report."""
-    noise = read_results(
-        _ResultsWithNoise, content, where, "says nothing of the noise of a recording",
-        "Name the results.json that cmm-uq report wrote of an earlier recording of such an artefact",
-    ).noise  # fmt: skip
+    fix = "Name the results.json that cmm-uq report wrote of an earlier recording of such an artefact"
+    noise = read_results(_ResultsWithNoise, content, where, "says nothing of the noise of a recording", fix).noise
     x, y, z = (noise.coordinate_um if axis is None else axis for axis in (noise.x_um, noise.y_um, noise.z_um))
     # root of the mean square: variances are what observations add, and their posterior mean is value² + u²
-    placing, growth = (
-        None if part is None else hypot(part.value, part.u) for part in (noise.placing_um, noise.growth_um)
-    )
+    placing, growth = (hypot(one.value, one.u) if one else None for one in (noise.placing_um, noise.growth_um))
     return EarlierNoise((x.value, y.value, z.value), placing, growth)
 
 
@@ -228,13 +224,6 @@ class _Offset(ResultsPart):
     W1: _Component
 
 
-class _Pose(ResultsPart):
-    pose: int
-    alpha_deg: float
-    beta_deg: float
-    gamma_deg: float
-
-
 Three = tuple[float, float, float]
 _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 
@@ -242,7 +231,7 @@ _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 class _Digitizer(ResultsPart):
     offset_mm: _Offset
     covariance_mm2: Annotated[list[_Row], Field(min_length=3, max_length=3)]
-    poses: Annotated[list[_Pose], Field(min_length=1, max_length=LISTED.most)]
+    poses: Annotated[list[Pose], Field(min_length=1, max_length=LISTED.most)]
 
 
 class _DigitizerResults(ResultsFile):
@@ -292,9 +281,9 @@ def digitizer_of(
         raise CmmUqError(f"is of a simulated recording, job {results.job.id!r}", where=str(folder / name),
                          fix="Measure the digitizer: a simulated calibration serves simulated jobs only")  # fmt: skip
     calibrated, offset = results.digitizer, results.digitizer.offset_mm
-    poses = tuple(facts.poses) or tuple(Pose(**pose.model_dump()) for pose in calibrated.poses)
-    return DescribedDigitizer((offset.U1.value, offset.V1.value, offset.W1.value), poses,
-                              tuple(map(_three, calibrated.covariance_mm2)), name, results.job.id)  # fmt: skip
+    poses, covariance = tuple(facts.poses or calibrated.poses), tuple(map(_three, calibrated.covariance_mm2))
+    mount = offset.U1.value, offset.V1.value, offset.W1.value
+    return DescribedDigitizer(mount, poses, covariance, name, results.job.id)
 
 
 def _three(values: Sequence[float]) -> Three:

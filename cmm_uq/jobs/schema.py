@@ -64,10 +64,8 @@ def job_schema(
     own = {"type": "string", "pattern": stated["pattern"]}
     keys["model"]["properties"]["effects"]["items"] = {"anyOf": [known, own]}
     named = {"properties": {"model": {"properties": {"effects": {"items": {"enum": list(effects)}}}}}}
-    joined = {
-        "properties": {"machine": {"required": ["joint"]}},
-        "required": ["machine"],
-    }  # an arm has effects of its own
+    # an arm has effects of its own
+    joined = {"properties": {"machine": {"required": ["joint"]}}, "required": ["machine"]}
     found["allOf"] = [{"if": {"not": {"anyOf": [{"required": ["effect"]}, joined]}}, "then": named}]
     keys["conformity"]["items"]["properties"]["standard"]["enum"] = list(standards)
     without = [name for name, table in tables.items() if not table.with_recording]
@@ -200,11 +198,8 @@ def written(value: Any) -> str:
     if isinstance(value, (dt.date, dt.datetime)):
         return value.isoformat()
     if isinstance(value, Mapping):
-        return (
-            "{ " + ", ".join(f"{written_key(key)} = {written(item)}" for key, item in value.items()) + " }"
-            if value
-            else "{}"
-        )
+        pairs = ", ".join(f"{written_key(key)} = {written(item)}" for key, item in value.items())
+        return f"{{ {pairs} }}" if pairs else "{}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(written, value)) + "]"
     raise TypeError(f"TOML has no {type(value).__name__}")

@@ -70,7 +70,7 @@ def numbers(cells: Sequence[str], where: Callable[[int], str], fix: str = GIVE) 
     wrong = Gathered()
     for i in doubtful:
         if problem := number_problem(cells[i], fix):
-            wrong.add(CmmUqError(problem[0], where=where(i), fix=problem[1]))
+            wrong.tell(problem[0], where=where(i), fix=problem[1])
     wrong.refuse()
     return values
 
@@ -114,16 +114,47 @@ FORMULA = tuple("=+-@＝＋－＠")  # what makes a spreadsheet compute a cell i
 
 
 @dataclass(frozen=True)
-class Cells:
-    """The rows of a CSV file: the first that is neither empty nor a comment names the columns, with its line; the others."""
+class CsvTable:
+    """A CSV file ``where``: the first row that is neither empty nor a comment names the columns; each row with its line."""
 
+    where: str
     header: list[str]
     header_line: int
     rows: list[list[str]]
     lines: list[int]
 
+    def at(self, row: int, column: str = "") -> str:
+        return f"{self.where} line {self.lines[row]}{column and f', column {column}'}"
 
-def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, delimiter: str = ",") -> Cells:
+    def texts(self, column: str, fix: str = "") -> list[str]:
+        """Cells of a column that must be there."""
+        if column not in self.header:
+            fix = fix or f"Give it; there are {', '.join(self.header)}"
+            raise CmmUqError(f"has no column {column!r}", where=self.where, fix=fix)
+        place = self.header.index(column)
+        return [row[place] for row in self.rows]
+
+    def numbers(self, column: str, fix: str = GIVE) -> Floats:
+        return numbers(self.texts(column), lambda row: self.at(row, column), fix)
+
+    def number(self, row: int, column: str) -> float:
+        text = self.rows[row][self.header.index(column)]
+        if problem := number_problem(text):
+            said, fix = f"{column}: {problem[0]}", problem[1]
+            if problem[0].endswith(("a number", "a finite number", "no value")):
+                said, fix = f"{column} = {text!r} is no number", "Give a number with a decimal point"
+            raise CmmUqError(said, where=self.at(row), fix=fix)
+        return float(text)
+
+    def refuse_uneven(self) -> None:
+        """Every row must have a cell for each column."""
+        for i, row in enumerate(self.rows):
+            if len(row) != len(self.header):
+                problem = f"has {len(row)} cells where the header has {len(self.header)}"
+                raise CmmUqError(problem, where=self.at(i), fix="Complete the row")
+
+
+def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, delimiter: str = ",") -> CsvTable:
     """Cells of a CSV file, without the blanks around them; rows may still differ in length.
 
     Empty rows, and those whose first cell begins with #, are passed over.
@@ -144,9 +175,7 @@ def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, d
     except csv.Error as error:
         raise CmmUqError(f"is no CSV: {error}", where=f"{where} line {reader.line_num}",
                          fix="Close every quotation mark on its own line, or leave them out") from None  # fmt: skip
-    if not found:
-        return Cells([], 0, [], [])
-    return Cells(found[0], lines[0], found[1:], lines[1:])
+    return CsvTable(where, found[0], lines[0], found[1:], lines[1:]) if found else CsvTable(where, [], 0, [], [])
 
 
 def column_problem(name: str) -> str | None:
@@ -187,46 +216,19 @@ def lines_within(text: str, where: str) -> Iterator[str]:
         yield line
 
 
-@dataclass(frozen=True)
-class CsvTable:
-    """A header and its rows of text, each as long as the header, with the line of each in the file ``where``."""
-
-    where: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    lines: tuple[int, ...]
-
-    def number(self, row: int, column: str) -> float:
-        text = self.rows[row][self.header.index(column)]
-        if problem := number_problem(text):
-            plain = problem[0].endswith(("a number", "a finite number", "no value"))
-            raise CmmUqError(
-                f"{column} = {text!r} is no number" if plain else f"{column}: {problem[0]}", where=self.at(row),
-                fix="Give a number with a decimal point" if plain else problem[1],
-            )  # fmt: skip
-        return float(text)
-
-    def at(self, row: int) -> str:
-        return f"{self.where} line {self.lines[row]}"
-
-
 def csv_table(content: bytes, where: str, required: Iterable[str], *, most_rows: Limit = ROWS) -> CsvTable:
-    cells = cells_of(content, where, "Save it as CSV in UTF-8", most_rows=most_rows)
-    header = tuple(cells.header)
-    if not cells.rows:
+    table = cells_of(content, where, "Save it as CSV in UTF-8", most_rows=most_rows)
+    if not table.rows:
         fix = f"Give a header ({', '.join(required)}) and a row for each position"
         raise CmmUqError("has no rows", where=where, fix=fix)
-    at = f"{where} line {cells.header_line}"
+    at = f"{where} line {table.header_line}"
     for column in required:
-        if column not in header:
+        if column not in table.header:
             raise CmmUqError(f"column {column} is missing", where=at, fix="Add it to the header")
-    for name in header:
-        if header.count(name) > 1:
+    for name in table.header:
+        if table.header.count(name) > 1:
             raise CmmUqError(f"column {name} is there twice", where=at, fix="Remove one of them")
-    if problem := next(filter(None, map(column_problem, header)), None):
+    if problem := next(filter(None, map(column_problem, table.header)), None):
         raise CmmUqError(problem, where=at, fix="Name it with letters, digits and _")
-    for line, row in zip(cells.lines, cells.rows, strict=True):
-        if len(row) != len(header):
-            problem = f"has {len(row)} cells, the header has {len(header)}"
-            raise CmmUqError(problem, where=f"{where} line {line}", fix="Complete the row")
-    return CsvTable(where, header, tuple(map(tuple, cells.rows)), tuple(cells.lines))
+    table.refuse_uneven()
+    return table

@@ -78,6 +78,21 @@ def _zero_or_more_than_nothing(value: float) -> float:
     return value
 
 
+def _rising(pair: list[float]) -> list[float]:
+    if not pair[0] < pair[1]:
+        raise ValueError("the first number must be the lower one")
+    return pair
+
+
+def _of_a_solid(cte: float) -> float:
+    if abs(cte) > 1e-3:
+        raise ValueError(f"{cte:g} is no expansion coefficient: steel has 11.5e-6 per kelvin")
+    return cte
+
+
+RISING = AfterValidator(_rising)  # of the ends of a range
+
+
 def _plain_column(name: str) -> str:
     if problem := column_problem(name):
         raise ValueError(problem)
@@ -98,9 +113,11 @@ Number = Annotated[int, Field(ge=-1_000_000_000, le=1_000_000_000)]  # of a meas
 
 # a number in a unit that only its name knows: as large as in a recording
 AnyFloat = Annotated[float, Field(ge=-1e15, le=1e15)]
+Expansion = Annotated[AnyFloat, AfterValidator(_of_a_solid)]  # coefficient of thermal expansion, 1/K
 Column = Annotated[str, AfterValidator(_plain_column)]  # name of a recorded column
 Unit = Annotated[str, Field(pattern=r"^[A-Za-z_°µ%/ ]*$", max_length=40)]  # as pint spells it
-Range = Annotated[list[Position], Field(min_length=2, max_length=2)]
+Pair = Annotated[list[Position], Field(min_length=2, max_length=2)]
+Range = Annotated[Pair, RISING]
 Triple = Annotated[list[Position], Field(min_length=3, max_length=3)]
 Names = Annotated[list[str], Field(max_length=EFFECTS.most)]
 Numbers = Annotated[list[Number], Field(max_length=LISTED.most)]

@@ -109,7 +109,7 @@ class _Reader:
 
     def wrong(self, node: Node, problem: str, fix: str) -> None:
         self.problems += 1
-        self.gathered.add(CmmUqError(problem, where=f"{self.where}, line {node.line}, {node.xpath}", fix=fix))
+        self.gathered.tell(problem, where=f"{self.where}, line {node.line}, {node.xpath}", fix=fix)
 
     def read(self, node: Node, cls: type[Element]) -> Any:
         """An element as a class; None where something of it is wrong."""

@@ -8,13 +8,14 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of
 from cmm_uq.jobs.importing.encodings import is_number
-from cmm_uq.jobs.importing.format import Cell, ImportKeys, Sheet, format_of
+from cmm_uq.jobs.importing.format import Cell, ImportKeys, format_of
 from cmm_uq.jobs.importing.header import LINES_BEFORE, text_of
 
 _NAME = re.compile(r"[\w][\w.-]{0,63}")
@@ -50,20 +51,12 @@ def matching(content: bytes, where: str) -> tuple[Path, ImportKeys] | None:
             head, keys = list(kept["head"]), ImportKeys.model_validate(kept["keys"])
         except (ValueError, TypeError, KeyError):
             raise CmmUqError("is no remembered format", where=str(path), fix="Remove it, and save it again") from None
-        try:
+        with suppress(CmmUqError):  # a file that is not read with these keys is of another format
             sheets = format_of(content, where).read(content, where, keys)
-        except CmmUqError:  # a file that is not read with these keys is of another format
-            continue
-        if head in _heads(sheets):
-            found.append((path, keys))
+            if any(head == head_of(row) for sheet in sheets for row in sheet.rows[:LINES_BEFORE]):
+                found.append((path, keys))
     if len({keys.model_dump_json() for _, keys in found}) > 1:
         both = " and ".join(path.stem for path, _ in found[:2])
-        raise CmmUqError(
-            f"is remembered as {both}, which differ", where=where, fix=f"Remove one of them from {folder()}"
-        )
+        fix = f"Remove one of them from {folder()}"
+        raise CmmUqError(f"is remembered as {both}, which differ", where=where, fix=fix)
     return found[0] if found else None
-
-
-def _heads(sheets: Sequence[Sheet]) -> Iterator[list[str]]:
-    for sheet in sheets:
-        yield from map(head_of, sheet.rows[:LINES_BEFORE])

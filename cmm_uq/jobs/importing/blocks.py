@@ -16,7 +16,18 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.factors import LINE, RUN, hint, ways_of
-from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Sheet, Sources, WrittenUnit, apart, sources_of, unit_named
+from cmm_uq.jobs.importing.format import (
+    LENGTH,
+    UNITS,
+    Cell,
+    NotReadError,
+    Sheet,
+    Sources,
+    WrittenUnit,
+    apart,
+    sources_of,
+    unit_named,
+)
 from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
 
 _FIGURE = re.compile(r"[±<>≤≥~]?\s*([+-]?\d[\d .,'’]*|[+-]?[.,]\d+)(?:[eE][+-]?\d+)?")
@@ -29,9 +40,8 @@ _DECIMAL = re.compile(r"^[^\d]*\d+[.,]\d+\D*$")
 _SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*(\w+)", re.IGNORECASE)
 _MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
 _BETWEEN = r"[\s;,]+(?:[YZ]\s*[=:]?\s*)?"
-_THREE = {
-    sign: re.compile(r"[^\d+−-]{0,20}?" + _BETWEEN.join([rf"([+−-]?\d+(?:[{sign}]\d+)?)"] * 3), re.I) for sign in ".,"
-}
+_PLACE = r"([+−-]?\d+(?:[SIGN]\d+)?)"
+_THREE = {s: re.compile(r"[^\d+−-]{0,20}?" + _BETWEEN.join([_PLACE] * 3).replace("SIGN", s), re.I) for s in ".,"}
 _FORMULA = re.compile(r"(?<=\S)\s*[=＝].*", re.DOTALL)  # that says how a column was computed
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 SMALL = ("um", "nm", "microinch")  # units of deviations
@@ -60,14 +70,14 @@ def figure(cell: Cell, sign: str) -> tuple[float, float] | None:
     return value, 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
 
 
+def heading(path: Sequence[str]) -> str:
+    return " ".join(dict.fromkeys(" ".join(text.split()) for text in path if text))
+
+
 def sign_of(rows: Sequence[Sequence[Cell]]) -> str:
     """The decimal sign that most figures of a sheet show."""
-    counts = Counter(
-        "," if cell.rfind(",") > cell.rfind(".") else "."
-        for row in rows
-        for cell in row
-        if isinstance(cell, str) and _DECIMAL.match(cell) and len(cell) < 24
-    )
+    texts = (cell for row in rows for cell in row if isinstance(cell, str) and _DECIMAL.match(cell) and len(cell) < 24)
+    counts = Counter("," if text.rfind(",") > text.rfind(".") else "." for text in texts)
     return "," if counts[","] > counts["."] else "."
 
 
@@ -102,14 +112,21 @@ class CutSheet:
         """Place of a row or a cell, for messages."""
         return self.sheet.at(self.where, row, i, "" if i is None else " ".join(self.path(row, i)))
 
+    def no_value(self, row: int, i: int) -> NotReadError:
+        return NotReadError("no value", where=self.at(row, i), fix="Complete the row, or take it out")
+
     def text(self, row: int, column: int) -> str:
         cells = self.sheet.rows[row]
         cell = cells[column] if column < len(cells) else ""
         return cell.strip() if isinstance(cell, str) else f"{cell:g}"
 
+    def figure(self, row: int, i: int) -> tuple[float, float] | None:
+        """Value and step of a cell; ``None`` where there is no figure."""
+        return self.figures[row][i] if i < len(self.figures[row]) else None
+
     def column(self, rows: Sequence[int], i: int) -> tuple[Floats, Floats]:
         """Values and steps of a column; NaN where there is no figure."""
-        own = [(self.figures[r][i] if i < len(self.figures[r]) else None) or (np.nan, 0.0) for r in rows]
+        own = [self.figure(row, i) or (np.nan, 0.0) for row in rows]
         return np.array([value for value, _ in own]), np.array([step for _, step in own])
 
     def place(self, i: int) -> dict[str, tuple[float, ...]]:
@@ -126,6 +143,15 @@ class CutSheet:
         """Whether a row names a unit that is none of lengths."""
         named = (unit_named(self.text(row, k)) for k, own in enumerate(self.figures[row]) if own is None)
         return any(unit.sort != LENGTH for unit in named if unit is not None)
+
+    def unit_beside(self, rows: Sequence[int]) -> WrittenUnit | None:
+        """The unit that a column names in every row."""
+        rows = [row for row in rows if not self.other_quantity(row)]
+        for i in range(self.width):
+            named = {u.name if (u := unit_named(self.text(row, i))) else "" for row in rows}
+            if len(named) == 1 and len(name := named.pop()) > 1 and name in UNITS and UNITS[name].sort == LENGTH:
+                return UNITS[name]
+        return None
 
     def named(self, i: int, path: Sequence[str]) -> str:
         """What the job says that a column is."""
@@ -150,12 +176,8 @@ class CutSheet:
         counted = [int(f[0]) for f in own if f[1] >= 1 and f[0] == int(f[0])]
         if len(counted) < len(own) or len(own) < 2:
             return False
-        steps = [b - a for a, b in pairwise(counted)]
-        return (
-            counted[0] in (0, 1)
-            and 1 in steps
-            and all(s == 1 or b in (0, 1) for s, b in zip(steps, counted[1:], strict=True))
-        )
+        steps = [(b - a, b) for a, b in pairwise(counted)]
+        return counted[0] in (0, 1) and any(s == 1 for s, _ in steps) and all(s == 1 or b in (0, 1) for s, b in steps)
 
     def _kind(self, i: int) -> str:
         """``figures``, ``text``, or ``rule`` of a row."""
@@ -166,20 +188,16 @@ class CutSheet:
         numbers = [k for k in filled if self.figures[i][k] is not None]
         if not numbers or self.place(i):
             return "text"
-        whole = all((self.figures[i][k] or (0, 0))[1] >= 1 for k in numbers)
-        if (
-            whole
-            and len(filled) == 2
-            and numbers == filled[1:]
-            and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN)
-        ):
+        counted = len(filled) == 2 and numbers == filled[1:] and (self.figures[i][filled[1]] or (0, 0))[1] >= 1
+        if counted and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN):
             return "text"  # as Position;1 above a block
         if self.targets(i):
             return "text"
         if self._is_head(i) and i + 1 < len(self.sheet.rows):
-            below = [k for k in numbers if k < len(self.figures[i + 1]) and self.figures[i + 1][k] is not None]
-            follows = any((self.figures[i + 1][k] or (0, 1))[1] < 1 for k in below)
-            if follows or self._only_units(i + 1):
+            units = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i + 1] if cell != ""]
+            if any((self.figure(i + 1, k) or (0, 1))[1] < 1 for k in numbers) or (
+                units and all(map(unit_named, units))
+            ):
                 return "text"
         texts = {k for k in filled if k not in numbers and unit_named(self.text(i, k)) is None}
         around = [self.figures[j] for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
@@ -208,41 +226,32 @@ class CutSheet:
             self._targets[i] = columns if any(way is not None for way in ways) else []
         return self._targets[i]
 
-    def _only_units(self, i: int) -> bool:
-        cells = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i] if cell != ""]
-        return bool(cells) and all(unit_named(cell) for cell in cells)
-
     def _blocks(self) -> Iterator[Block]:
         pending: list[int] = []
         titles: dict[str, str] = {}
         block: Block | None = None
-        count = 0
         self.kinds = [self._kind(i) for i in range(len(self.sheet.rows))]
         self._ruled = {self.sheet.lines[i] for i, kind in enumerate(self.kinds) if kind == "rule"}
         for i, kind in enumerate(self.kinds):
-            if kind == "rule":
-                continue
             if kind == "text":
                 pending.append(i)
+            if kind != "figures":
                 continue
-            numbers = [k for k, f in enumerate(self.figures[i]) if f is not None]
-            head = self._head(pending, numbers) if pending else []
-            for row in pending:
-                if row not in head:
-                    titles = {**titles, **self._titles(row)}
+            head = self._head(pending, [k for k, f in enumerate(self.figures[i]) if f is not None]) if pending else []
+            above, pending = [row for row in pending if row not in head], []
+            for row in above:
+                titles = {**titles, **self._titles(row)}
             if head or block is None:
                 if block is not None:
                     yield block
-                count += 1
-                block = Block(self._paths(head), number=count, head=head)
-            block.above += [row for row in pending if row not in head]
+                block = Block(self._paths(head), number=1 if block is None else block.number + 1, head=head)
+            block.above += above
             block.rows.append(i)
+            block.titles.append(titles)
             place = {name: xyz for row in block.above for name, xyz in self.place(row).items()}
             if "start" in place and len(place) > 1:
                 other = "end" if "end" in place else "direction"
                 self.places_of[i] = f" {other} ".join(",".join(map(repr, place[one])) for one in ("start", other))
-            block.titles.append(titles)
-            pending = []
         if block is not None:
             yield block
 
@@ -265,18 +274,15 @@ class CutSheet:
 
     def _places_beside(self, block: Block) -> dict[int, str]:
         """Places of lines that stand in the columns of a table, once for the rows that follow."""
-        columns: dict[str, list[int]] = {}
+        columns: dict[str, list[int]] = {"start": []}
         for i, path in enumerate(block.paths):
-            if any(i < len(self.figures[row]) and self.figures[row][i] for row in block.rows):
+            if any(self.figure(row, i) for row in block.rows):
                 for name in [name for _, name in _named_places(" ".join(path))][:1]:
                     columns.setdefault(name, []).append(i)
         found, last = dict[int, str](), ""
         other = next((name for name in ("end", "direction") if len(columns.get(name, ())) == 3), "")
-        for row in block.rows if other and len(columns.get("start", ())) == 3 else ():
-            figures = [
-                self.figures[row][i] if i < len(self.figures[row]) else None
-                for i in (*columns["start"], *columns[other])
-            ]
+        for row in block.rows if other and len(columns["start"]) == 3 else ():
+            figures = (self.figure(row, i) for i in (*columns["start"], *columns[other]))
             own = [repr(figure[0]) for figure in figures if figure]
             last = f"{','.join(own[:3])} {other} {','.join(own[3:])}" if len(own) == 6 else last
             found |= {row: last} if last else {}
@@ -284,39 +290,35 @@ class CutSheet:
 
     def _titles(self, row: int) -> dict[str, str]:
         """Titles in a row of text, by the word that each begins with; without one where it has nothing else."""
+        cells = [str(cell) for cell in self.sheet.rows[row] if cell != ""]
         text = " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
-        text = _before_place(text) if self.place(row) else text
-        pairs, cells = _PAIRS.split(text), [str(cell) for cell in self.sheet.rows[row] if cell != ""]
+        if placed := bool(self.place(row)):
+            text = text[: next(_named_places(text))[0].start()].strip()
+        pairs = _PAIRS.split(text)
         parts = pairs if all(":" in pair for pair in pairs) else [text]
         parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
         titles = {(first[0].casefold() if (first := WORD.search(part)) else part): part for part in parts}
-        single = len([c for c in self.sheet.rows[row] if c != ""]) == 1 or self.place(row)
-        return {**titles, "": text} if single else titles
+        return {**titles, "": text} if len(cells) == 1 or placed else titles
 
     def _head(self, pending: Sequence[int], numbers: Sequence[int]) -> list[int]:
         """Rows of a head at the end of rows of text, above a row with figures in these columns."""
         head: list[int] = []
         for row in reversed(pending):
-            cells = self.sheet.rows[row]
-            filled = [k for k, cell in enumerate(cells) if cell != ""]
+            filled = [k for k, cell in enumerate(self.sheet.rows[row]) if cell != ""]
             if not head and filled == [0] and len(numbers) > 1:
                 continue  # a title below its head
             between = range(self.sheet.lines[row] + 1, self.sheet.lines[head[0]] if head else 0)
-            gap = any(line not in self._ruled for line in between)
             texts = [self.text(row, k) for k in filled]
-            dated = sum(DATED.search(text) is not None for text in texts)
-            few = len(filled) < 4
-            odd = (
-                0 < dated < 3 or len(text) > 60 or (few and "=" in text) or len(_PRINTED.findall(text)) > 1
-                for text in texts
+            odd = any(
+                len(text) > 60 or (len(filled) < 4 and "=" in text) or len(_PRINTED.findall(text)) > 1 for text in texts
             )
-            if len(head) == DEEPEST or gap or any(odd) or self.place(row):
+            odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3
+            if len(head) == DEEPEST or odd or not self._ruled.issuperset(between) or self.place(row):
                 break
             over = [k for k in filled if k in numbers]
             apart = not head and (len(filled) < 2 or not over) and filled != over
-            grouped = len(filled) > 2 and filled == [
-                *range(len(filled))
-            ]  # the last of them stands over all that follow
+            # the last of them stands over all that follow
+            grouped = len(filled) > 2 and filled == [*range(len(filled))]
             ahead = head and ((2 * filled[-1] < numbers[-1] and not grouped) or texts[0].endswith(":") or filled == [0])
             if apart or ahead or (any(f is not None and f[1] < 1 for f in self.figures[row]) and not self.targets(row)):
                 break
@@ -354,10 +356,6 @@ def places_in(text: str, sign: str) -> dict[str, tuple[float, ...]]:
     return found
 
 
-def _before_place(text: str) -> str:
-    return text[: next(_named_places(text))[0].start()].strip()
-
-
 def unit_of(path: Sequence[str]) -> WrittenUnit | None:
     """The unit in the texts above a column: the lowest one."""
     for text in reversed(path):
@@ -368,25 +366,13 @@ def unit_of(path: Sequence[str]) -> WrittenUnit | None:
 
 def unit_elsewhere(sheets: Sequence[Sheet], *, small: bool) -> WrittenUnit | None:
     """The one unit of lengths, or of deviations, that the texts of a file say (``UNITS=IN``), else mention."""
-    texts = {
-        cell
-        for sheet in sheets
-        for row in sheet.rows
-        for cell in row
-        if isinstance(cell, str) and not cell[:1].isdigit()
-    }
-    for pattern in (_SAYS_UNIT, _MENTION):
-        words = {
-            word
-            for text in texts
-            for word in pattern.findall(text)
-            if pattern is _SAYS_UNIT or (len(word) > 1 and word.casefold() != "in")
-        }
-        named = {
-            unit.name
-            for word in words
-            if (unit := unit_named(word)) and unit.sort == LENGTH and (unit.name in SMALL) == small
-        }
+    cells = (cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str))
+    texts = {cell for cell in cells if not cell[:1].isdigit()}
+    said = {word for text in texts for word in _SAYS_UNIT.findall(text)}
+    mentioned = {word for text in texts for word in _MENTION.findall(text) if len(word) > 1 and word.casefold() != "in"}
+    for words in (said, mentioned):
+        units = [unit for unit in map(unit_named, words) if unit and unit.sort == LENGTH]
+        named = {unit.name for unit in units if (unit.name in SMALL) == small}
         if len(named) == 1:
             return UNITS[named.pop()]
     return None

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from itertools import compress
 
 import numpy as np
 
@@ -20,18 +19,8 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
-from cmm_uq.jobs.importing.format import (
-    LENGTH,
-    UNITS,
-    Cell,
-    Fact,
-    ImportKeys,
-    NotReadError,
-    Sheet,
-    WrittenUnit,
-    length_named,
-)
-from cmm_uq.jobs.importing.header import NAME, REMARK, SUMMARY, Header, filled_down, is_summary, shown
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, NotReadError, Sheet, WrittenUnit
+from cmm_uq.jobs.importing.header import NAME, REMARK, SUMMARY, Header, filled_down, is_summary, shown, text_of
 from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
 
 LARGEST_MACHINE_MM = 40_000.0  # longest diagonal of a measuring machine: gantries of 30 m are the largest made
@@ -53,6 +42,17 @@ def by_extent(written: Written, where: str, reach_mm: float | None) -> tuple[Wri
                                 extent=in_inches, reach=reach)  # fmt: skip
     what = f"nothing says the unit of lengths: points {extent:.4g} apart may be in mm or in inch"
     raise NotReadError(what, where=where, fix='Say unit = "mm" or unit = "inch"')
+
+
+def settled_unit(
+    stated: Sequence[tuple[WrittenUnit, Text]], where: str, by_size: Callable[[], tuple[WrittenUnit, Text]]
+) -> tuple[WrittenUnit, Fact]:
+    """The one unit of lengths that is stated, and how, else the one by the size of the machine."""
+    if len({unit.name for unit, _ in stated}) > 1:
+        each = " and ".join(f"{unit.name} {how}" for unit, how in stated)
+        raise CmmUqError(f"the unit is {each}", where=where, fix="Mend the file, or leave out unit")
+    unit, how = stated[0] if stated else by_size()
+    return unit, Fact("unit", say("Unit of lengths"), say("{unit}, {how}", unit=Verbatim(unit.name), how=how))
 
 
 Columns = tuple[dict[str, Floats], Ints, dict[str, str], tuple[Fact, ...]]
@@ -130,6 +130,10 @@ class ExportTable:
         sheet, width = self.sheet, len(self.header.headings)
         usable: list[int] = []
         text: list[int] = []
+
+        def figured(rows: Sequence[int]) -> list[int]:
+            return [i for i in rows if all(cell == "" or is_number(cell) for cell in sheet.rows[i])]
+
         for i in range(self.header.first, len(sheet.rows)):
             row = sheet.rows[i]
             if not any(cell != "" for cell in row):
@@ -140,19 +144,14 @@ class ExportTable:
                 text.append(i)
             else:
                 _refuse_another_length(sheet, self.header, i, needed, self.where)
-                figures = [j for j in text if all(cell == "" or is_number(cell) for cell in sheet.rows[j])]
-                if figures:
+                if figures := figured(text):
                     raise CmmUqError("has no coordinates, and figures follow", where=sheet.at(self.where, figures[0]),
                                      fix="Remove the line, or complete it")  # fmt: skip
                 self.left_out += [shown(sheet, j, REMARK) for j in text]
                 text = []
                 usable.append(i)
-        suspects = []
-        if sheet.unended and len(usable) > 1 and all(len(sheet.rows[i]) == width for i in usable[:-1]):
-            suspects.append(usable[-1])
-        if not sheet.spreadsheet:
-            suspects += [i for i in text if all(cell == "" or is_number(cell) for cell in sheet.rows[i])]
-        for i in suspects:
+        cut = sheet.unended and len(usable) > 1 and all(len(sheet.rows[i]) == width for i in usable[:-1])
+        for i in [*(usable[-1:] if cut else []), *([] if sheet.spreadsheet else figured(text))]:
             if len(sheet.rows[i]) < width:
                 raise CmmUqError(f"the row ends after {len(sheet.rows[i])} of {width} cells: the file was cut off",
                                  where=sheet.at(self.where, i), fix="Export it again")  # fmt: skip
@@ -161,8 +160,8 @@ class ExportTable:
     def place(self, column: int, row: int) -> str:
         return self.sheet.at(self.where, self.rows[row], column, self.header.headings[column])
 
-    def written(self, name: str, sign: str, *, blank: bool = False) -> list[tuple[Floats, WrittenUnit | None, int]]:
-        """Values as written of each column of a name, with the unit that its cells or its heading name; NaN of blank cells.
+    def written(self, name: str, sign: str) -> list[tuple[Floats, WrittenUnit | None, int]]:
+        """Values as written of each column of a name, with the unit that its cells or its heading name.
 
         A column beside the coordinates that holds no number at all is left out.
         """
@@ -172,11 +171,7 @@ class ExportTable:
             cells, unit = split_units(self.cells[i], at)
             if name not in COORDINATES and not any(cell != "" and is_number(cell) for cell in cells):
                 return []
-            fix = MEASURE if name in COORDINATES else GIVE_OR_REMOVE
-            values = np.full(len(cells), np.nan)
-            filled = np.array([cell != "" or not blank for cell in cells])
-            rows = np.flatnonzero(filled)
-            values[filled] = values_of(list(compress(cells, filled)), sign, partial(_at_row, at, rows), fix)
+            values = values_of(cells, sign, at, MEASURE if name in COORDINATES else GIVE_OR_REMOVE)
             parts.append((values, unit or self.header.units.get(i), i))
         return parts
 
@@ -213,13 +208,9 @@ class ExportTable:
             raise CmmUqError(mixed, where=self.where, fix="Export all coordinates in one unit")
         stated = [(named[each], say("in the heading {heading}", heading=Verbatim(each))) for each in headings.values()]
         for name, origin in ((self.sheet.unit, say("in the file")), (keys.unit, say("by the key unit"))):
-            if name is not None and (unit := length_named(name)):
+            if unit := units.length_named(name or ""):
                 stated.append((unit, origin))
-        if len({unit.name for unit, _ in stated}) > 1:
-            each = " and ".join(f"{unit.name} {how}" for unit, how in stated)
-            raise CmmUqError(f"the unit is {each}", where=self.where, fix="Mend the file, or leave out unit")
-        unit, how = stated[0] if stated else by_extent(written, self.where, reach_mm)
-        return unit, Fact("unit", say("Unit of lengths"), say("{unit}, {how}", unit=Verbatim(unit.name), how=how))
+        return settled_unit(stated, self.where, lambda: by_extent(written, self.where, reach_mm))
 
     def in_units(
         self, name: str, parts: Sequence[tuple[Floats, WrittenUnit | None, int]], length: WrittenUnit
@@ -251,9 +242,7 @@ class ExportTable:
 
     def labels(self) -> list[str] | None:
         columns = self.header.columns.get(NAME, ())
-        if len(columns) != 1 or self.header.points > 1:
-            return None
-        return [cell if isinstance(cell, str) else f"{cell:g}" for cell in self.cells[columns[0]]]
+        return [*map(text_of, self.cells[columns[0]])] if len(columns) == 1 and self.header.points == 1 else None
 
     def facts(self, left_out: Sequence[str]) -> list[Fact]:
         """The kind of table, and what of it is not used."""
@@ -264,36 +253,27 @@ class ExportTable:
             facts.append(Fact("header", say("Header"), Verbatim(self.start.removeprefix(self.where).lstrip(": "))))
         indices = [*header.unused, *(i for name in left_out for i in header.columns[name])]
         if unused := [header.headings[i] for i in indices]:
-            shown, more = commas(names(unused[:_SHOWN])), len(unused) - _SHOWN
-            text = say("{shown} and {more} more", shown=shown, more=more) if more > 0 else shown
-            facts.append(Fact("not_used", say("Columns not used"), text))
+            facts.append(Fact("not_used", say("Columns not used"), _first_of(unused, commas)))
         if self.after:
             facts.append(Fact("after", say("Lines of text after the table"), number(self.after)))
         return [*facts, *left_out_fact(self.left_out)]
 
 
-def _at_row(at: Callable[[int], str], rows: Ints, i: int) -> str:
-    return at(int(rows[i]))
+def _first_of(words: Sequence[str], join: Callable[[Sequence[Text]], Text]) -> Text:
+    """The first of many words, and how many more there are."""
+    shown, more = join(names(words[:_SHOWN])), len(words) - _SHOWN
+    return say("{shown} and {more} more", shown=shown, more=more) if more > 0 else shown
 
 
 def left_out_fact(rows: Sequence[str]) -> list[Fact]:
     """Rows that are left out, by their place and why."""
-    if not rows:
-        return []
     alike: dict[tuple[str, str], list[str]] = {}  # numbers of rows, by what stands there and why it is left out
     for row in rows:
         place, _, what = row.partition(": ")
         before, _, last = place.rpartition(" ")
         alike.setdefault((before, what), []).append(last)
     told = [f"{before} {', '.join(numbers)}: {what}".strip() for (before, what), numbers in alike.items()]
-    shown, more = semicolons(list(map(Verbatim, told[:_SHOWN]))), len(told) - _SHOWN
-    return [
-        Fact(
-            "left_out",
-            say("Rows left out"),
-            say("{shown} and {more} more", shown=shown, more=more) if more > 0 else shown,
-        )
-    ]
+    return [Fact("left_out", say("Rows left out"), _first_of(told, semicolons))] if told else []
 
 
 def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequence[int], where: str) -> None:

@@ -14,32 +14,13 @@ from itertools import combinations, permutations
 import numpy as np
 
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet
+from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet, heading
 from cmm_uq.jobs.importing.factors import hint, places, ways_of
-from cmm_uq.jobs.importing.format import NotReadError, WrittenUnit
+from cmm_uq.jobs.importing.format import WrittenUnit
 from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
-from cmm_uq.jobs.importing.roles import (
-    DEVIATION,
-    MEASURED,
-    NOMINAL,
-    REFERENCE,
-    SUMMARY,
-    TARGET,
-    FigureColumn,
-    SheetReading,
-    agrees,
-    columns_in,
-    down,
-    factors,
-    heading,
-    labels_of,
-    like,
-    mean_of,
-    said,
-    unit_beside,
-)
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said, without_sums, words_above
 
-_MOST, _COMPLETE = 0.8, "Complete the row, or take it out"
+_MOST = 0.8  # of figures: where fewer are there, they may be of something else
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 _LETTER = re.compile(r"(?<![A-Za-zÀ-ÿ])([xyzXYZ])(?![A-Za-zÀ-ÿ])|^([XYZ])(?=[A-Z]?[a-z])")
 _ENDS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])(?:[- ]?(?:axis|achse|axe|wert|value|[ck]oord\w*\.?))?", re.IGNORECASE)
@@ -50,12 +31,12 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     columns = columns_in(grid, blocks, rows)
     checked, triples = 0, []
     for letter in "xyz":
-        own = [c for c in columns if c.role != SUMMARY and c.may_be_length and _axis(c.path) == letter]
+        own = [c for c in columns if c.role != "summary" and c.may_be_length and _axis(c.path) == letter]
         own = [c for c in own if not _directed(c.path)]
         nominal = _nominal_of(own)
         checked += len(nominal) // 2
-        rest = [c for c in own if c.i not in nominal and c.role not in (NOMINAL, DEVIATION, REFERENCE)]
-        triples.append([c for c in rest if not mean_of(c, [o for o in rest if o is not c])] or rest)
+        rest = [c for c in own if c.i not in nominal and c.role not in ("nominal", "deviation", "reference")]
+        triples.append(without_sums(rest) or rest)
     bare = _bare(grid, columns, rows)
     triples = [[c] for c in bare] or triples
     every = [c for own in triples for c in own]
@@ -77,9 +58,9 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
                 return None
     for labels in reading.labels:
         labels |= {key: _LETTER.sub(" ", text).strip() or text for key, text in labels.items() if key[0] == "head"}
-    xyz_ = np.array(reading.figures).reshape(-1, 3)
-    alike = len(xyz_) > 2 and all(like(xyz_[:, 0], xyz_[:, k]) for k in (1, 2))  # lengths on lines called X, Y, Z
-    return reading if len(xyz_) and not alike and _apart(xyz_, reading.unit) else None
+    places = np.array(reading.figures).reshape(-1, 3)
+    alike = len(places) > 2 and all(like(places[:, 0], places[:, k]) for k in (1, 2))  # lengths on lines X, Y, Z
+    return reading if len(places) and not alike and _apart(places, reading.unit) else None
 
 
 def _bare(grid: CutSheet, columns: Sequence[FigureColumn], rows: Sequence[int]) -> list[FigureColumn]:
@@ -88,13 +69,12 @@ def _bare(grid: CutSheet, columns: Sequence[FigureColumn], rows: Sequence[int]) 
     alone = len(grid.blocks) == 1 and not grid.blocks[0].head and len(rows) == len(grid.blocks[0].rows) > 3
     if not alone or len(fine) != 3 or len(columns) > 4 or grid.width > fine[-1].i + 1 or fine[-1].i - fine[0].i != 2:
         return []
-    apart = all(c.full and np.ptp(c.values) > 1 for c in fine) and fine[0].i in (0, 1)
+    if fine[0].i > 1 or not all(c.full and np.ptp(c.values) > 1 for c in fine):
+        return []
     alike = any(like(a.values, b.values, 1) for a, b in permutations(fine, 2))
-    names = {grid.text(row, 0) for row in rows}
-    again = len(names) < len(rows) or (
-        apart and places(np.column_stack([c.values for c in fine])).max() + 1 < len(rows)
-    )
-    return fine if apart and not alike and not again else []
+    again = len({grid.text(row, 0) for row in rows}) < len(rows)
+    again = again or places(np.column_stack([c.values for c in fine])).max() + 1 < len(rows)
+    return [] if alike or again else fine
 
 
 def _nominal_of(columns: Sequence[FigureColumn]) -> set[int]:
@@ -103,19 +83,17 @@ def _nominal_of(columns: Sequence[FigureColumn]) -> set[int]:
     values, fine = np.array([c.values for c in columns]), np.array([c.step for c in columns])
     slack = np.add.outer(fine, fine) + 1e-6
     for d in columns:
-        if d.role not in (None, DEVIATION) or not np.any(d.values) or not np.isfinite(d.values).any():
+        if d.role not in (None, "deviation") or not np.any(d.values) or not np.isfinite(d.values).any():
             continue
-        at = int(
-            np.nanargmax(np.abs(d.values))
-        )  # of all sums that may be so few hold in this row, whatever the others say
+        at = int(np.nanargmax(np.abs(d.values)))  # the row in which the fewest sums hold by chance
         apart = np.subtract.outer(values[:, at], values[:, at])
-        for f in dict.fromkeys(f for c in columns for f in factors(d, c)):
+        for f in dict.fromkeys(f for c in columns for f in d.factors(c)):
             for i, k in np.argwhere(~(np.abs(apart - d.values[at] * f) > d.step * f + slack)):
                 measured, nominal = columns[i], columns[k]
-                words = measured.role not in (NOMINAL, REFERENCE) and nominal.role != MEASURED
+                words = measured.role not in ("nominal", "reference") and nominal.role != "measured"
                 other = d is not measured and d is not nominal and measured is not nominal
-                if other and words and not {nominal.i, d.i} <= found and f in factors(d, nominal):
-                    found |= {nominal.i, d.i} if agrees(d, measured, nominal, f) else set()
+                if other and words and not {nominal.i, d.i} <= found and f in d.factors(nominal):
+                    found |= {nominal.i, d.i} if d.agrees(measured, nominal, f) else set()
     return found
 
 
@@ -150,19 +128,16 @@ def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -
         if not any(stems) and any(map(str.isdigit, above)):
             stems = [above] * len(stems)  # the head of its own of each feature
         columns = [c for c in columns_in(grid, blocks, own) if c.i != i]
-        _refuse_gaps(grid, own, [c for c in columns if c.role == MEASURED])
+        _refuse_gaps(grid, own, [c for c in columns if c.role == "measured"])
         columns = [c for c in columns if c.full]
         fine = [c for c in columns if c.step < 1]
-        measured, checked = [c for c in fine if c.role == MEASURED], 0
         nominal = _nominal_of(fine)
-        if nominal:
-            checked = len(nominal) // 2
-            measured = measured or [c for c in fine if c.i not in nominal and c.role is None]
-        measured = measured or [c for c in fine if c.role is None]
-        if not measured or (not checked and len(measured) > 1 and any(c.role is None for c in measured)):
+        unnamed = [c for c in fine if c.role is None]
+        measured = [c for c in fine if c.role == "measured"] or [c for c in unnamed if c.i not in nominal] or unnamed
+        if not measured or (not nominal and len(measured) > 1 and any(c.role is None for c in measured)):
             continue
-        reading = SheetReading("points", unit=measured[0].unit or unit_beside(grid, own), checked=checked, others=rows)
-        reading.taken = {"x_mm, y_mm, z_mm": measured}
+        reading = SheetReading("points", measured[0].unit or grid.unit_beside(own), None, len(nominal) // 2)
+        reading.taken, reading.others = {"x_mm, y_mm, z_mm": measured}, rows
         reading.collect(grid, own, columns, [i, *(c.i for c in fine)])
         if not _threes([{**one, ("name", ""): stem} for one, stem in zip(reading.beside, stems, strict=True)]):
             return None
@@ -181,7 +156,7 @@ def _refuse_gaps(grid: CutSheet, rows: Sequence[int], columns: Sequence[FigureCo
     for c in columns:
         there = np.isfinite(c.values)
         if c.step < 1 and _MOST < there.mean() < 1:
-            raise NotReadError("no value", where=grid.at(rows[int(np.argmin(there))], c.i), fix=_COMPLETE)
+            raise grid.no_value(rows[int(np.argmin(there))], c.i)
 
 
 def _threes(labels: Sequence[Mapping[tuple[str, str], str]]) -> bool:
@@ -189,7 +164,7 @@ def _threes(labels: Sequence[Mapping[tuple[str, str], str]]) -> bool:
     named = False
     for key in labels[0]:
         own = [one.get(key, "") for one in labels]
-        of = hint(key[1].partition(" ")[2] if key[0] == "column" else key[1], lengths=False)
+        of = hint(words_above(key), lengths=False)
         if key[0] == "column" and of in ("line", "point") and own[0] != own[1] != own[2]:
             return False  # lines along the axes
         counts = key[0] != "block" and of != "run" and (of is not None or not all(one.isdecimal() for one in own))
@@ -202,18 +177,18 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
     columns = columns_in(grid, blocks, rows)
     if blocks[0].head and (across := grid.targets(blocks[0].head[-1])):
         return _across(grid, rows, columns, across, blocks[0].head[-1])
-    ends = [c for c in columns if c.role in (TARGET, NOMINAL) and np.ptp(c.values[np.isfinite(c.values)]) > 1]
+    ends = [c for c in columns if c.role in ("target", "nominal") and np.ptp(c.values[np.isfinite(c.values)]) > 1]
     target = min(ends, key=lambda c: c.counts, default=None)  # and not their numbers
     if target is None or not np.isfinite(target.values[0]):
         return None
-    values = down(target.values)
-    beside = [c for c in columns if c is not target and c.role in (None, DEVIATION, MEASURED) and c.may_be_length]
+    values = target.downwards
+    beside = [c for c in columns if c is not target and c.role in (None, "deviation", "measured") and c.may_be_length]
     small = [c for c in beside if (c.step < 1 or _way(c.heading)) and not like(c.values + 1000, values + 1000)]
-    source = [c for c in small if not mean_of(c, [o for o in small if o is not c and _same_way(o, c)])]
-    directed = [c for c in source if _way(c.heading)] or [c for c in source if c.role == DEVIATION]
-    source = directed or source  # the others are reversals, spreads and what was recorded beside them
+    small = _of_runs(small)
+    directed = [c for c in small if _way(c.heading)] or [c for c in small if c.role == "deviation"]
+    source = directed or small  # the others are reversals, spreads and what was recorded beside them
     reading = SheetReading("runs", unit=target.unit, small=next((c.unit for c in source if c.unit), None))
-    if not any(map(_way, (c.heading for c in source))) and (reached := _reached(columns, target, values, source)):
+    if not any(_way(c.heading) for c in source) and (reached := _reached(columns, target, values, source)):
         source, reading.positions = reached, True
     if not source or any(a.heading == b.heading and not _way(a.heading) for a, b in combinations(source, 2)):
         return None  # or of two instruments
@@ -225,23 +200,28 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
                 reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
             else:
                 reading.blank.append((row, c.i))
-    return reading if any(ways_of(label.values) is not None for label in labels_of(reading)) else None
+    return reading if any(ways_of(label.values) is not None for label in reading.every_label) else None
 
 
 def _reached(
     columns: Sequence[FigureColumn], target: FigureColumn, values: Floats, deviations: Sequence[FigureColumn]
 ) -> list[FigureColumn]:
     """Positions that were reached, as deviations from their targets, where no deviation stands beside them."""
-    roles = (None, MEASURED, REFERENCE)
-    near = [c for c in columns if c is not target and c.role in roles and c.may_be_length and c.step < 1]
-    near = [c for c in near if like(c.values, values, _OFF_MM) and np.nanmax(np.abs(values)) > 10 * _OFF_MM]
-    found = [
-        replace(c, values=c.values - values)
-        for c in near
-        if not mean_of(c, [o for o in near if o is not c and _same_way(o, c)])
-    ]
-    given = any(agrees(d, c, target, f) for d in deviations for c in near for f in factors(d, c))
-    return [] if given else found
+    near = [c for c in columns if c is not target and c.role in (None, "measured", "reference")]
+    near = [c for c in near if c.may_be_length and c.step < 1 and like(c.values, values, _OFF_MM)]
+    near = [c for c in near if np.nanmax(np.abs(values)) > 10 * _OFF_MM]
+    given = any(d.agrees(c, target, f) for d in deviations for c in near for f in d.factors(c))
+    return [] if given else [replace(c, values=c.values - values) for c in _of_runs(near)]
+
+
+def _of_runs(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
+    """Columns that are no mean of others of the same sense of travel."""
+    found = []
+    for c in columns:
+        ways = [(o, ways_of([o.heading, c.heading])) for o in columns if o is not c]
+        if not c.sums_up([o for o, of in ways if of is None or of[0] == of[1]]):
+            found.append(c)
+    return found
 
 
 def _across(
@@ -250,14 +230,12 @@ def _across(
     """Deviations below the targets that stand above them, a way and a run in each row."""
     source = [c for c in columns if c.i in across]
     labels = {row: [grid.text(row, k) for k in range(across[0])] for row in rows}
-    own = [row for row in rows if said(labels[row]) != SUMMARY and any(map(_way, labels[row]))]
-    reading = SheetReading("runs")
-    reading.taken = {"target": source, "reading_um": source}
+    own = [row for row in rows if said(labels[row]) != "summary" and any(map(_way, labels[row]))]
+    reading = SheetReading("runs", taken={"target": source, "reading_um": source})
     reading.collect(grid, own, columns)
     for k, row in enumerate(own):
         for c in source:
-            target, figure = grid.figures[head][c.i], grid.figures[row][c.i]
-            if target is not None and figure is not None:
+            if (target := grid.figure(head, c.i)) and (figure := grid.figure(row, c.i)):
                 reading.add(row, k, c, [c], (target[0], figure[0]))
     return reading if len(reading.figures) == len(own) * len(across) else None
 
@@ -265,8 +243,3 @@ def _across(
 def _way(text: str) -> bool:
     """Whether a text names a sense of travel."""
     return any(ways_of([text, other]) is not None for other in "+-")
-
-
-def _same_way(a: FigureColumn, b: FigureColumn) -> bool:
-    ways = ways_of([a.heading, b.heading])
-    return ways is None or ways[0] == ways[1]

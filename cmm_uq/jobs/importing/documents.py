@@ -7,28 +7,17 @@ result, a column each, by the names that it gives.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from fractions import Fraction
 from itertools import groupby
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import ROWS
-from cmm_uq.base.messages import Verbatim, number, say
+from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import UNITS as PRINTED
 from cmm_uq.jobs.importing.encodings import begins_with, local, root_of
-from cmm_uq.jobs.importing.format import (
-    LENGTH,
-    UNITS,
-    Fact,
-    Format,
-    ImportKeys,
-    Row,
-    Sheet,
-    WrittenUnit,
-    length_named,
-    sheets_of,
-)
+from cmm_uq.jobs.importing.format import LENGTHS, UNITS, Fact, Format, ImportKeys, Row, Sheet, length_named, sheets_of
+from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.dcc.figures import QuantityFigures
@@ -55,39 +44,33 @@ class Qif(Format):
                 rows.append(_feature(element, named, where))
             elif local(element) == "MeasuredPointSet":
                 rows += _points(element, where)
-            elif local(element).endswith(_MEASUREMENT):
-                others += 1
+            else:
+                others += local(element).endswith(_MEASUREMENT)
         if not rows:
-            raise CmmUqError(f"holds no measured sphere, point or circle, and {others} other features", where=where,
-                             fix="Export the results with the measured features and their locations")  # fmt: skip
-        facts = [Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", "")))]
-        if others:
-            facts.append(Fact("features_not_used", say("Features that are no place"), number(others)))
-        headings, unit = ["name", "x", "y", "z", "i", "j", "k"], length_unit(root, where)
-        return sheets_of(rows, headings, unit=unit, decimal=".", facts=tuple(facts))
+            problem = f"holds no measured sphere, point or circle, and {others} other features"
+            fix = "Export the results with the measured features and their locations"
+            raise CmmUqError(problem, where=where, fix=fix)
+        facts = facts_of(Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", ""))),
+                         "features_not_used", say("Features that are no place"), others)  # fmt: skip
+        return sheets_of(rows, WITH_DIRECTION, unit=length_unit(root, where), decimal=".", facts=facts)
 
 
 def length_unit(root: Element, where: str) -> str | None:
     """Name of the unit of length in ``FileUnits``, whose name must fit the factor beside it; ``None`` where there is none."""
-    primary = next((element for element in root.iter() if local(element) == "PrimaryUnits"), None)
-    length = None if primary is None else _first(primary, "LinearUnit")
+    primary = root.find(".//{*}PrimaryUnits")
+    length = None if primary is None else primary.find("{*}LinearUnit")
     if length is None:
         return None
-    name, factor = child(length, "UnitName"), next((e.text for e in length.iter() if local(e) == "Factor"), None)
+    name, factor = child(length, "UnitName"), length.findtext(".//{*}Factor")
     metres, unit = float(factor or "1"), length_named(name)
     if unit is None:
-        lengths = (one for one in UNITS.values() if one.sort == LENGTH)
-        unit = next((one for one in lengths if abs(_metres(one) / metres - 1) < 1e-9), None)
-    if unit is None or abs(_metres(unit) / metres - 1) > 1e-6:
+        unit = next((one for one in map(UNITS.get, LENGTHS) if one and abs(one.metres / metres - 1) < 1e-9), None)
+    if unit is None or abs(unit.metres / metres - 1) > 1e-6:
         unknown = f"of {factor} m is not known"
         problem = unknown if factor else "has no Factor to metres (UnitConversion), and is then the metre"
-        raise CmmUqError(f"the unit {name!r} {problem}", where=f"{where}: FileUnits",
-                         fix="Export the results in mm or inch")  # fmt: skip
+        fix = "Export the results in mm or inch"
+        raise CmmUqError(f"the unit {name!r} {problem}", where=f"{where}: FileUnits", fix=fix)
     return unit.name
-
-
-def _metres(unit: WrittenUnit) -> float:
-    return float(Fraction(unit.up, unit.down * 1000))
 
 
 def _feature(element: Element, named: dict[str, str], where: str) -> Row:
@@ -103,14 +86,13 @@ def _feature(element: Element, named: dict[str, str], where: str) -> Row:
 def _points(element: Element, where: str) -> Iterator[Row]:
     number_, count = element.get("id", ""), element.get("count", "")
     place = f"{where}: MeasuredPointSet id {number_}"
-    points, normals = _first(element, "Points"), _first(element, "Normals")
+    points, normals = element.find("{*}Points"), element.find("{*}Normals")
     if points is None:
         raise CmmUqError("holds its points in binary form, which is not read", where=place, fix="Export them as text")
-    words = "".join(points.itertext()).split()
+    words, directions = ([] if one is None else "".join(one.itertext()).split() for one in (points, normals))
     if len(words) % 3 or (count.isdigit() and int(count) * 3 != len(words)):
-        raise CmmUqError(f"has {len(words)} numbers where {element.get('count')} points have three each", where=place,
-                         fix="Export it again: it was cut off or changed")  # fmt: skip
-    directions = [] if normals is None else "".join(normals.itertext()).split()
+        problem = f"has {len(words)} numbers where {element.get('count')} points have three each"
+        raise CmmUqError(problem, where=place, fix="Export it again: it was cut off or changed")
     directions = directions if len(directions) == len(words) else [""] * len(words)
     for i in range(0, len(words), 3):
         label = f"set {number_} point {i // 3 + 1}"
@@ -128,12 +110,7 @@ def three(text: str, place: str) -> list[str]:
 
 def child(element: Element, name: str) -> str:
     """Text of the first element of this name in another; empty where there is none."""
-    inner = _first(element, name)
-    return "" if inner is None or inner.text is None else inner.text.strip()
-
-
-def _first(element: Element, name: str) -> Element | None:
-    return next((inner for inner in element if local(inner) == name), None)
+    return (element.findtext(f"{{*}}{name}") or "").strip()
 
 
 _BY_DSI = {unit.dsi: str.__str__(unit) for unit in PRINTED.values()}

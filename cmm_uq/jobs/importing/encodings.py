@@ -26,19 +26,11 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16", "UTF-16"),
     (codecs.BOM_UTF16_BE, "utf-16", "UTF-16"),
 )
-_TITLES = {
-    "utf-8": "UTF-8",
-    "utf-16": "UTF-16",
-    "cp1252": "Windows-1252",
-    "latin-1": "ISO 8859-1",
-    "cp932": "Shift JIS",
-}
-_TITLES |= {"cp1250": "Windows-1250", "cp1251": "Windows-1251", "gb18030": "GB 18030", "cp949": "Windows-949"}
+_TITLES = {"utf-8": "UTF-8", "utf-16": "UTF-16", "latin-1": "ISO 8859-1", "cp932": "Shift JIS", "gb18030": "GB 18030"}
+_TITLES |= {f"cp{number}": f"Windows-{number}" for number in (1250, 1251, 1252, 949)}
 # two characters of Shift JIS after each other, as words of Japanese are; letters with accents in Windows-1252 are single
-_JAPANESE, _ACCENTED = (
-    re.compile(rb"(?:[\x81-\x9f][\x40-\x7e\x80-\xfc]){2}"),
-    re.compile(rb"[\xc0-\xff](?![\x80-\xff])"),
-)
+_JAPANESE = re.compile(rb"(?:[\x81-\x9f][\x40-\x7e\x80-\xfc]){2}")
+_ACCENTED = re.compile(rb"[\xc0-\xff](?![\x80-\xff])")
 # letters within words that are none of one western language, but of Czech or Polish in Windows-1250
 _EASTERN = (re.compile("(?<=[a-z])(?:ø|(?=.*ø)[ìè])|ø(?=[a-z])"), re.compile("(?<=[^\\W\\d_])[³¹¿œ](?=[^\\W\\d_])"))
 _PAIRED = re.compile(rb"[\xa1-\xfe]{2}")  # of Chinese (GB 2312) and Korean (KS X 1001), which come in words
@@ -94,8 +86,8 @@ def report_lines(text: str, where: str) -> list[str]:
         raise CmmUqError(f"has {len(lines)} lines, {LINES.most} are the most", where=where, fix="Split the report")
     longest, line = max(((len(line), -i) for i, line in enumerate(lines, 1)), default=(0, 0))
     if longest > _REPORT_LINE:
-        raise CmmUqError(f"the line has {longest} characters, {_REPORT_LINE} are the most in a report",
-                         where=f"{where} line {-line}", fix="Export it again as text")  # fmt: skip
+        problem = f"the line has {longest} characters, {_REPORT_LINE} are the most in a report"
+        raise CmmUqError(problem, where=f"{where} line {-line}", fix="Export it again as text")
     return lines
 
 
@@ -171,18 +163,15 @@ def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -
     groups = (_COMMA_GROUPS,) if any(_TWO_COMMAS.search(text) for text in texts) or points else ()
     point = _first(texts, (*groups, _POINT_DECIMAL) if points else groups)
     if comma and point:
-        raise CmmUqError(
-            f"{comma[2]!r} has a decimal comma, and {point[2]!r} ({at(*point[:2])}) has a decimal point",
-            where=at(*comma[:2]), fix="Export it again with one decimal sign; if it was put together, mend the odd rows",
-        )  # fmt: skip
+        problem = f"{comma[2]!r} has a decimal comma, and {point[2]!r} ({at(*point[:2])}) has a decimal point"
+        fix = "Export it again with one decimal sign; if it was put together, mend the odd rows"
+        raise CmmUqError(problem, where=at(*comma[:2]), fix=fix)
     if comma or point:
         return "," if comma else "."
     i = next(i for i, text in enumerate(texts) if "," in text)
-    row = next(row for row, cell in enumerate(columns[i]) if isinstance(cell, str) and "," in cell)
-    value = str(columns[i][row])
-    thousands, thousandths = value.replace(",", ""), value.replace(",", ".")
-    raise CmmUqError(f"{value!r} can be {thousands} or {thousandths}, and no number of the file tells", where=at(i, row),
-                     fix='Say decimal = "," or decimal = "."')  # fmt: skip
+    row, value = next((row, str(cell)) for row, cell in enumerate(columns[i]) if isinstance(cell, str) and "," in cell)
+    problem = f"{value!r} can be {value.replace(',', '')} or {value.replace(',', '.')}, and no number of the file tells"
+    raise CmmUqError(problem, where=at(i, row), fix='Say decimal = "," or decimal = "."')
 
 
 def _first(texts: Sequence[str], patterns: Sequence[re.Pattern[str]]) -> tuple[int, int, str] | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
 LINE, RUN, POINT = "line", "run", "point"
+_MARKS = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
 _TOKEN = re.compile(r"[^\W_]+")
 _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
 _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
@@ -43,24 +44,20 @@ _Counted = tuple[Label, Ints, str | None]  # a label, the number of its value fo
 
 def ways_of(values: Sequence[str]) -> list[int] | None:
     """Sense of travel that labels name, +1 or −1; ``None`` where one of them names none, or all the same."""
-    words = words_of("ways")
-    marks = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
     found: list[int] = []
     for value in values:
-        text = value.strip(" ()[]")
-        own = {marks[c] for c in text if c in "↑↓→←"}
+        text, words = value.strip(" ()[]"), plain_words(value)
+        own = {_MARKS[c] for c in text if c in "↑↓→←"}
         ends = (text[-1:], text[:1] if not text[1:2].isdigit() else "")
-        own |= set() if own else {marks[c] for c in ends if c in marks}
-        own |= {sense for name, sense in (("forward", 1), ("backward", -1)) if _has(value, words[name])}
+        own |= set() if own else {_MARKS[c] for c in ends if c in _MARKS}
+        for name, sense in (("forward", 1), ("backward", -1)):
+            asian = [one for one in words_of("ways")[name] if len(one) > 1 and unspaced(one)]
+            if any(word in words_of("ways")[name] or any(one in word for one in asian) for word in words):
+                own.add(sense)
         if len(own) != 1:
             return None
         found += own
     return found if len({*found}) > 1 else None
-
-
-def _has(text: str, words: frozenset[str]) -> bool:
-    asian = [one for one in words if len(one) > 1 and unspaced(one)]
-    return any(word in words or any(one in word for one in asian) for word in plain_words(text))
 
 
 def counted(label: Label, *, lengths: bool) -> str | None:
@@ -122,12 +119,13 @@ def parts_of(label: Label) -> list[Label]:
             before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
         if len(found) > 1 or (found and names is not label.values and found[0].values != label.values):
             return found
-    last = [re.fullmatch(r"(.*?([^\W\d_]*))[\W_]*(\d+)\D*", value) for value in label.values]
-    own = [(label.words, [m[1] for m in last if m]), (label.words, [m[3] for m in last if m])]
-    words = {m[2] for m in last if m}
-    if len(words) == 1 and hint(word := words.pop(), lengths=True) == RUN:
-        own[1] = (word, own[1][1])
-    return [Label(of, tuple(values), "part") for of, values in own] if all(last) else []
+    last = [m for value in label.values if (m := re.fullmatch(r"(.*?([^\W\d_]*))[\W_]*(\d+)\D*", value))]
+    if len(last) < len(label.values):
+        return []
+    words = {m[2] for m in last}
+    of = word if len(words) == 1 and hint(word := words.pop(), lengths=True) == RUN else label.words
+    names = tuple(m[1] for m in last)
+    return [Label(label.words, names, "part"), Label(of, tuple(m[3] for m in last), "part")]
 
 
 def _halves(label: Label) -> list[Label]:
@@ -154,18 +152,17 @@ def together(*every: Ints) -> Ints:
     return codes([*zip(*(one.tolist() for one in every), strict=True)])
 
 
-def _varying(labels: Sequence[Label], *, lengths: bool) -> Iterator[tuple[Label, Ints]]:
-    """Labels that differ and are there for all, without those that say the same again."""
-    seen: dict[bytes, tuple[Label, Ints]] = {}
-    for label in labels:
+def _varying(labels: Sequence[Label], *, lengths: bool) -> list[_Counted]:
+    """Labels, and parts of names, that differ and are there for all, without those that say the same again."""
+    seen: dict[bytes, _Counted] = {}
+    names = (label for label in labels if label.sort in ("column", "head", "title") and len({*label.values}) > 1)
+    for label in (*labels, *(part for name in names for part in parts_of(name))):
         own = codes(label.values)
         if own.max(initial=0) and "" not in label.values:
-            before = seen.get(own.tobytes())
-            if before is None or (
-                counted(before[0], lengths=lengths) is None and counted(label, lengths=lengths) is not None
-            ):
-                seen[own.tobytes()] = label, own
-    yield from seen.values()
+            before, of = seen.get(own.tobytes()), counted(label, lengths=lengths)
+            if before is None or (before[2] is None and of is not None):
+                seen[own.tobytes()] = label, own, of
+    return [*seen.values()]
 
 
 def in_turn(key: Ints) -> Ints:
@@ -188,10 +185,7 @@ def numbered_runs(values: Sequence[str]) -> Ints:
 
 def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
     """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
-    count, several = len(reference), bool(reference.max(initial=0) > 0)
-    found: list[_Counted] = [
-        (one, own, counted(one, lengths=True)) for one, own in _varying(with_parts(labels), lengths=True)
-    ]
+    count, several, found = len(reference), bool(reference.max(initial=0) > 0), _varying(labels, lengths=True)
     if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
         found = [(f[0], f[1], RUN if f[0].sort == "head" and _counting(f[0].values) else f[2]) for f in found]
     plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
@@ -206,9 +200,8 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
         return int(together(reference, *(f[1] for f in line), *([run[1]] if run else []), *more).max()) + 1
 
     rank = {sort: k for k, sort in enumerate(("title", "sheet", "head", "block", "part", "column"))}
-    for one in sorted(
-        (f for f in plain if f[2] in (None, POINT)), key=lambda f: (f[2] == POINT, rank[f[0].sort], f[1].max())
-    ):
+    others = [f for f in plain if f[2] in (None, POINT)]
+    for one in sorted(others, key=lambda f: (f[2] == POINT, rank[f[0].sort], f[1].max())):
         if apart() == count or apart(one[1]) == apart():
             continue
         whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
@@ -227,13 +220,11 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
         fix = 'Say what tells them apart: columns = { line = "…", repeat = "…" }'
         raise NotReadError(what, where=place, fix=fix)
     names = [" ".join(dict.fromkeys(parts)) for parts in zip(*(f[0].values for f in line), strict=True)]
-    titles = [label.values[0] for label in labels if label.values[0] and (label.sort == "sheet" or _titled(label))]
+    titles = [one for one in labels if one.sort == "title" and counted(one, lengths=True) == LINE]
+    titled = [one.values[0] for one in labels if one.values[0] and (one.sort == "sheet" or one in titles)]
     numbers = in_turn(key) if run is None else numbered_runs(run[0].values)
-    return (
-        names or [titles[-1] if titles else "1"] * count,
-        numbers,
-        [f[0].words for f in (*line, *([run] if run else []))],
-    )
+    used = [f[0].words for f in (*line, *([run] if run else []))]
+    return names or [titled[-1] if titled else "1"] * count, numbers, used
 
 
 def _one_run(labels: Sequence[Label], runs: Sequence[_Counted], place: str) -> _Counted | None:
@@ -252,16 +243,6 @@ def _one_run(labels: Sequence[Label], runs: Sequence[_Counted], place: str) -> _
 
 def _digits(label: Label) -> bool:
     return all(value.strip().isdigit() for value in label.values)
-
-
-def with_parts(labels: Sequence[Label]) -> list[Label]:
-    """Labels, and the parts of names among them."""
-    names = (label for label in labels if label.sort in ("column", "head", "title") and len({*label.values}) > 1)
-    return [*labels, *(part for label in names for part in parts_of(label))]
-
-
-def _titled(label: Label) -> bool:
-    return label.sort == "title" and counted(label, lengths=True) == LINE
 
 
 def places(xyz: Floats) -> Ints:
@@ -286,16 +267,12 @@ def points_of_names(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]
     """
     count, place = len(xyz), places(xyz)
     again = bool(place.max() + 1 < count)
-    found: list[_Counted] = [
-        (label, own, counted(label, lengths=False)) for label, own in _varying(with_parts(labels), lengths=False)
-    ]
+    found = _varying(labels, lengths=False)
     if any({*f[0].values} <= _LETTERS for f in found):  # then P counts positions
         letters = [re.match(r"([pm])(?![^\W\d_])", f"{f[0].words}{f[0].values[0]}".casefold()) for f in found]
         known = {m[1] for m in letters if m}
-        found = [
-            (f[0], f[1], f[2] if m is None else LINE if m[1] == "p" else RUN if known == {"p", "m"} else f[2])
-            for f, m in zip(found, letters, strict=True)
-        ]
+        of = {"p": LINE, **({"m": RUN} if len(known) == 2 else {})}
+        found = [(*f[:2], of.get(m[1], f[2]) if m else f[2]) for f, m in zip(found, letters, strict=True)]
     each = [f for f in found if f[1].max() + 1 == count]
     found = [f for f in found if f[1].max() + 1 < count]
     run = _run_of(found, place) if again or any(f[2] == RUN for f in found) else None
@@ -343,45 +320,41 @@ def _rigid(measurement: _Counted, point: _Counted, repeat: Ints | None, xyz: Flo
 
 def _run_of(found: Sequence[_Counted], place: Ints) -> _Counted | None:
     """The label that counts repeats: by its words, else the one by which all points at one place differ."""
+
+    def called(label: _Counted) -> bool:
+        return hint(label[0].words, lengths=True) == RUN
+
+    def differ(*labels: _Counted) -> bool:
+        return bool(together(place, *(f[1] for f in labels)).max() + 1 == len(place))
+
     apart = [f for f in found if not fixes(place, f[1])]
     by_words = [f for f in found if f[2] == RUN]
     fixed = any(f[2] == LINE and fixes(place, f[1]) for f in found)  # then another word for measurements counts repeats
-    by_place = [f for f in apart if f[2] is None or (f[2] == LINE and (fixed or hint(f[0].words, lengths=True) == RUN))]
-    by_place = [f for f in by_place if together(place, f[1]).max() + 1 == len(place)]
-    if any(
-        f[2] == LINE == hint(f[0].words, lengths=True) and together(place, f[1]).max() + 1 == len(place) for f in apart
-    ):
-        by_place = [
-            f for f in by_place if f[2] is not None
-        ]  # an artefact turned about its middle comes to the same places
+    by_place = [f for f in apart if (f[2] is None or (f[2] == LINE and (fixed or called(f)))) and differ(f)]
+    if any(f[2] == LINE == hint(f[0].words, lengths=True) and differ(f) for f in apart):
+        # an artefact turned about its middle comes to the same places
+        by_place = [f for f in by_place if f[2] is not None]
     choices = [f for f in by_words if f in apart] or by_words or [f for f in by_place if f[2] is None] or by_place
-    if not choices and together(place, *(f[1] for f in apart)).max() + 1 == len(place):
+    if not choices and differ(*apart):
         fast = max(apart, key=lambda f: np.count_nonzero(np.diff(f[1])))  # the others are set-ups, read again in each
-        choices = [fast] if fast[2] == LINE and hint(fast[0].words, lengths=True) == RUN else []
+        choices = [fast] if fast[2] == LINE and called(fast) else []
     return min(choices, key=lambda f: (f[1].max(), _LAST.index(f[0].sort)), default=None)
 
 
 def _columns(measurement: _Counted | None, point: _Counted, repeat: Ints | None, count: int) -> dict[str, list[str]]:
-    columns = {
-        "measurement": ["1"] * count if measurement is None else [*measurement[0].values],
-        "point": [*point[0].values],
-    }
+    measurements = ["1"] * count if measurement is None else [*measurement[0].values]
+    columns = {"measurement": measurements, "point": [*point[0].values]}
     return columns if repeat is None else {**columns, "repeat": [f"{n}" for n in repeat]}
 
 
 def alike_in_turn(xyz: Floats) -> int | None:
     """How many points in turn are one measurement of a rigid artefact that was turned, by the distances that come again."""
-    for size in range(2, len(xyz) // 3 + 1):
-        if len(xyz) % size:
-            continue
+    for size in (size for size in range(2, len(xyz) // 3 + 1) if len(xyz) % size == 0):
         own = xyz.reshape(-1, size, 3)
         distances = np.linalg.norm(own[:, :, None] - own[:, None, :], axis=3)
         along = (own[:, -1] - own[:, 0]) / np.maximum(distances[:, 0, -1:], 1e-9)
-        if (
-            np.ptp(distances, axis=0).max() < _RIGID_MM
-            and distances[:, 0, -1].min() > 1
-            and np.abs(along @ along[0]).min() < 0.99
-        ):
+        rigid = np.ptp(distances, axis=0).max() < _RIGID_MM and distances[:, 0, -1].min() > 1
+        if rigid and np.abs(along @ along[0]).min() < 0.99:
             return size
     return None
 
@@ -391,8 +364,7 @@ def _on_a_ball(xyz: Floats) -> bool:
     about = xyz - xyz.mean(axis=0)
     if len(xyz) < _PROBED or np.linalg.svd(about, compute_uv=False)[2] < _ROUND * np.linalg.norm(about):
         return False
-    centre = np.linalg.lstsq(np.column_stack([2 * about, np.ones(len(xyz))]), np.sum(about**2, axis=1), rcond=None)[0][
-        :3
-    ]
+    sides = np.column_stack([2 * about, np.ones(len(xyz))])
+    centre = np.linalg.lstsq(sides, np.sum(about**2, axis=1), rcond=None)[0][:3]
     distance = np.linalg.norm(about - centre, axis=1)
     return bool(distance.max() < _LARGEST_BALL_MM and np.ptp(distance) < _FORM_MM)

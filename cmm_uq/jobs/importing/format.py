@@ -10,8 +10,10 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cache, partial
 from importlib import import_module
+from itertools import zip_longest
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
@@ -33,6 +35,11 @@ class WrittenUnit:
     up: int = 1
     down: int = 1
     offset: float = 0.0
+
+    @property
+    def metres(self) -> float:
+        """One of it, a unit of length."""
+        return float(Fraction(self.up, self.down * 1000))
 
 
 LENGTH, TEMPERATURE, TIME, PRESSURE, SHARE = "length", "temperature", "time", "pressure", "share"
@@ -311,16 +318,8 @@ _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
 )  # fmt: skip
 # Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
-    *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc"),
-    *(
-        "reports.Calypso",
-        "reports.Qdas",
-        "reports.Dmis",
-        "pcdmis.PcDmis",
-        "pcdmis.FeatureReport",
-        "reports.Ipp",
-        "interferometer.Rtl",
-    ),
+    *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc", "reports.Calypso", "reports.Qdas"),
+    *("reports.Dmis", "pcdmis.PcDmis", "pcdmis.FeatureReport", "reports.Ipp", "lines.Rtl"),
 )
 
 
@@ -354,17 +353,13 @@ def _built_in(name: str) -> Format:
 def stacked(sheet: Sheet) -> Sheet:
     """Tables side by side, between which a column is empty and whose heads are alike, below each other."""
     for row in sheet.rows:
-        own = [
-            k
-            for k in range(3, len(row) // 2 + 1)
-            if row[:k] == row[k + 1 : 2 * k + 1] and row[k] == "" and all(row[:k])
-        ]
-        if not own or any(
-            len(one) > own[0] and one[own[0]] != "" and sum(cell != "" for cell in one) > 2 for one in sheet.rows
-        ):
+        halves = ((k, row[:k], row[k + 1 : 2 * k + 1]) for k in range(3, len(row) // 2 + 1) if row[k] == "")
+        width = next((k for k, one, other in halves if one == other and all(one)), 0)
+        beyond = [one for one in sheet.rows if len(one) > width and one[width] != ""] if width else []
+        if not width or any(sum(cell != "" for cell in one) > 2 for one in beyond):
             continue
-        starts = range(0, max(map(len, sheet.rows)), own[0] + 1)
-        parts = [(row[k : k + own[0]], line) for k in starts for row, line in zip(sheet.rows, sheet.lines, strict=True)]
+        starts = range(0, max(map(len, sheet.rows)), width + 1)
+        parts = [(row[k : k + width], line) for k in starts for row, line in zip(sheet.rows, sheet.lines, strict=True)]
         filled = [(cells, line) for cells, line in parts if any(cell != "" for cell in cells)]
         return replace(sheet, rows=[cells for cells, _ in filled], lines=[line for _, line in filled])
     return sheet
@@ -373,13 +368,8 @@ def stacked(sheet: Sheet) -> Sheet:
 def transposed(sheet: Sheet) -> Sheet | None:
     """The widest part of a sheet with its rows as columns."""
     wide = [i for i, row in enumerate(sheet.rows) if len(row) > 3]
-    if not wide or len(wide) > 300 or max(len(sheet.rows[i]) for i in wide) > 300:
+    width = max((len(sheet.rows[i]) for i in wide), default=0)
+    if not wide or len(wide) > 300 or width > 300:
         return None
-    width = max(len(sheet.rows[i]) for i in wide)
-    rows = [[*sheet.rows[i], *[""] * (width - len(sheet.rows[i]))] for i in wide]
-    return replace(
-        sheet,
-        rows=[list(row) for row in zip(*rows, strict=True)],
-        lines=[sheet.lines[wide[0]]] * width,
-        spreadsheet=False,
-    )
+    columns = [[*row] for row in zip_longest(*(sheet.rows[i] for i in wide), fillvalue="")]
+    return replace(sheet, rows=columns, lines=[sheet.lines[wide[0]]] * width, spreadsheet=False)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import tomllib
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from itertools import pairwise
@@ -62,9 +62,7 @@ def printed_words(table: str) -> Mapping[str, tuple[str, ...]]:
 @cache
 def words_of(table: str) -> Mapping[str, frozenset[str]]:
     """The same as :func:`plain_words` makes them of a heading."""
-    return {
-        name: frozenset(" ".join(plain_words(one)) for one in words) for name, words in printed_words(table).items()
-    }
+    return {name: frozenset(" ".join(plain_words(one)) for one in of) for name, of in printed_words(table).items()}
 
 
 _WORDS = re.compile(r"[^\W\d_\u3040-\u9fff]+|[\u3040-\u9fff]+|\d+")  # Japanese beside a letter is a word of its own
@@ -174,8 +172,9 @@ class Header:
 def header_of(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> Header | None:
     """The header of a sheet: the first row that names the wanted columns; ``None`` where no row does."""
     named = {name: sources_of(given) for name, given in keys.columns.items()}
-    if (numbered := by_number(keys)) and any(set(columns) <= set(keys.columns) for columns in wanted):
-        return first_figures(sheet, numbered)
+    numbers = {name: tuple(one - 1 for one in own if isinstance(one, int)) for name, own in named.items()}
+    if any(set(columns) <= set(named) for columns in wanted) and all(len(numbers[n]) == len(named[n]) for n in named):
+        return _first_figures(sheet, numbers)
     for row, cells in enumerate(sheet.rows[:LINES_BEFORE]):
         if len(cells) < 2 and not keys.columns:
             continue
@@ -187,14 +186,7 @@ def header_of(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Seque
     return None
 
 
-def by_number(keys: ImportKeys) -> dict[str, tuple[int, ...]]:
-    """Indices of the columns that a job names, where it names all by number."""
-    named = {name: sources_of(given) for name, given in keys.columns.items()}
-    numbers = {name: tuple(one - 1 for one in own if isinstance(one, int)) for name, own in named.items()}
-    return numbers if all(len(own) == len(numbers[name]) for name, own in named.items()) else {}
-
-
-def first_figures(sheet: Sheet, columns: Mapping[str, tuple[int, ...]]) -> Header | None:
+def _first_figures(sheet: Sheet, columns: Mapping[str, tuple[int, ...]]) -> Header | None:
     """A table whose columns are named by number: it begins with the first row of figures in all of them."""
     every = [i for own in columns.values() for i in own]
     needed = [i for name in COORDINATES for i in columns.get(name, ())] or every
@@ -251,15 +243,17 @@ def unambiguous(found: Assigned, headings: Sequence[str], place: str, points: in
         if len(own) > 1 and not several:
             shown, first = " and ".join(repr(headings[i]) for _, i in own[:3]), own[0][1]
             which = first + 1 if headings.count(headings[first]) > 1 else f'"{headings[first]}"'
-            raise NotReadError(f"columns {shown} could all be {name}", where=place,
-                             fix=f"Say which: columns = {{ {name} = {which} }}")  # fmt: skip
+            fix = f"Say which: columns = {{ {name} = {which} }}"
+            raise NotReadError(f"columns {shown} could all be {name}", where=place, fix=fix)
         columns[name] = tuple(i for _, i in sorted(own, key=lambda pair: pair[0] or 0))
     count = max(map(len, columns.values()))
     odd = [name for name, own in columns.items() if len(own) not in (1, count)]
     odd += [name for name in COORDINATES if len(columns.get(name, ())) not in (0, count)]
     if odd:
-        raise NotReadError(f"{count} points in a row, and {len(columns[odd[0]])} columns {odd[0]}", where=place,
-                         fix=f"Say which: columns = {{ {odd[0]} = [ … ] }}, one heading for each point")  # fmt: skip
+        fix = f"Say which: columns = {{ {odd[0]} = [ … ] }}, one heading for each point"
+        raise NotReadError(
+            f"{count} points in a row, and {len(columns[odd[0]])} columns {odd[0]}", where=place, fix=fix
+        )
     return columns
 
 
@@ -269,11 +263,11 @@ def with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping
     units = {i: meaning.unit for i, meaning in meanings.items() if meaning.unit}
     odd = {i: meaning.odd_unit for i, meaning in meanings.items() if meaning.odd_unit and not meaning.unit}
     below = sheet.rows[row + 1] if row + 1 < len(sheet.rows) else []
-    filled = ((i, cell) for i, cell in enumerate(below) if cell not in ("", "()", "[]", "-"))
-    alone = {i: unit_named(cell.strip("[]()<>{} ")) if isinstance(cell, str) else None for i, cell in filled}
-    if alone and all(alone.values()):
-        return Header(row, row + 2, headings, columns, units | {i: unit for i, unit in alone.items() if unit}, odd)
-    return Header(row, row + 1, headings, columns, units, odd)
+    filled = {i: cell for i, cell in enumerate(below) if cell not in ("", "()", "[]", "-")}
+    texts = {i: cell.strip("[]()<>{} ") for i, cell in filled.items() if isinstance(cell, str)}
+    alone = {i: unit for i, text in texts.items() if (unit := unit_named(text))}
+    whole = bool(alone) and len(alone) == len(filled)
+    return Header(row, row + 1 + whole, headings, columns, units | alone if whole else units, odd)
 
 
 def names_axes(row: Sequence[Cell]) -> bool:
@@ -300,8 +294,8 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
         given = f" ({', '.join(map(repr, texts))})" if keys.columns else ""
         lengths = ", or of lengths { nominal_mm = …, length_mm = … }" if "x_mm" in wanted[0] else ""
         of = "a table of points or lengths" if lengths else "a table of points"
-        return NotReadError(f"no line names the columns{given} of {of}", where=where,
-                          fix=f"Say which column is which: columns = {{ x_mm = …, y_mm = …, z_mm = … }}{lengths}")  # fmt: skip
+        fix = f"Say which column is which: columns = {{ x_mm = …, y_mm = …, z_mm = … }}{lengths}"
+        return NotReadError(f"no line names the columns{given} of {of}", where=where, fix=fix)
     named = keys.columns.items()
     lacking = [name for name, given in named if any(_place(one, headings) is None for one in sources_of(given))]
     known = {understood(heading).column for heading in headings} | set(keys.columns)
@@ -309,8 +303,8 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
     listed = ", ".join(map(repr, headings[:_SHOWN])) + (" …" if len(headings) > _SHOWN else "")
     nominal = any(_NOMINAL & {*plain_words(without_unit(heading)[0])} for heading in headings)
     hint = " (nominal values are not taken for measured ones)" if nominal else ""
-    return NotReadError(f"no column is {missing} among {listed}{hint}", where=place,
-                      fix=f'Say which: columns = {{ {missing} = "…" }}')  # fmt: skip
+    fix = f'Say which: columns = {{ {missing} = "…" }}'
+    return NotReadError(f"no column is {missing} among {listed}{hint}", where=place, fix=fix)
 
 
 _TOLD = 40  # characters of a row that is left out
@@ -341,11 +335,4 @@ def filled_down(cells: Sequence[Cell]) -> Sequence[Cell]:
     places = [i for i, cell in enumerate(cells) if cell != ""]
     if len(places) == len(cells) or not places or places[0] or any(cells[a] == cells[b] for a, b in pairwise(places)):
         return cells
-    return list(_down(cells))
-
-
-def _down(cells: Sequence[Cell]) -> Iterator[Cell]:
-    last: Cell = ""
-    for cell in cells:
-        last = cell if cell != "" else last
-        yield last
+    return [cells[a] for a, b in pairwise([*places, len(cells)]) for _ in range(a, b)]

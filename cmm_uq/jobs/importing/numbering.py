@@ -11,7 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.encodings import is_number, values_of
-from cmm_uq.jobs.importing.factors import RUN, Label, counted, numbered_runs, places, points_of_names
+from cmm_uq.jobs.importing.factors import RUN, Label, codes, counted, in_turn, numbered_runs, places, points_of_names
 from cmm_uq.jobs.importing.format import Cell, Fact, ImportKeys, NotReadError
 from cmm_uq.jobs.importing.header import understood
 
@@ -55,20 +55,20 @@ def completed(
     columns: Mapping[str, Floats], labels: Sequence[str] | None, xyz: Floats, keys: ImportKeys, place: str
 ) -> tuple[dict[str, Floats], list[Fact]]:
     """Numbers (n,) of every point (n, 3), where the columns of the file leave some out."""
-    numbers, count = dict(columns), len(xyz)
+    numbers, count, how = dict(columns), len(xyz), None
+    if MEASUREMENT in numbers and POINT in numbers:
+        return numbers, []
     if MEASUREMENT in numbers:
-        if POINT in numbers:
-            return numbers, []
         follow = say("numbered as they follow in their measurement")
         how, numbers[POINT] = say("{columns} {how}", columns=Verbatim(POINT), how=follow), _within(numbers)
-        return numbers, [Fact("numbering", say("Numbering"), how)]
-    if keys.points_per_measurement is None and labels and POINT not in numbers:
+    elif keys.points_per_measurement is None and labels and POINT not in numbers:
         again = count <= _COMPARED and places(xyz).max() + 1 < count  # then what differs at one place is a repeat
         if not again and (named := _of_names(labels)) is not None:
             first = commas([say("{column} {number:g}", column=Verbatim(column), number=float(values[0]))
                             for column, values in named.items()])  # fmt: skip
-            how = say("from names: {name} is {first}", name=Verbatim(labels[0]), first=first)
-            return numbers | named, [Fact("numbering", say("Numbering"), how)]
+            how, numbers = say("from names: {name} is {first}", name=Verbatim(labels[0]), first=first), numbers | named
+    if how is not None:
+        return numbers, [Fact("numbering", say("Numbering"), how)]
     every = [Label("name", tuple(labels))] if labels else []
     every += [Label(name, tuple(f"{one:g}" for one in values)) for name, values in numbers.items()]
     found, facts = numbered_points(every, xyz, keys, place)
@@ -104,13 +104,8 @@ def numbered_points(
 
 def _within(columns: Mapping[str, Floats]) -> Floats:
     """1, 2, … in each (measurement, repeat)."""
-    repeat = columns.get(REPEAT, np.ones(len(columns[MEASUREMENT])))
-    last: dict[tuple[float, float], int] = {}
-    values = []
-    for key in zip(columns[MEASUREMENT].tolist(), repeat.tolist(), strict=True):
-        last[key] = last.get(key, 0) + 1
-        values.append(last[key])
-    return np.array(values, dtype=np.float64)
+    keys = (columns[name].tolist() for name in (MEASUREMENT, REPEAT) if name in columns)
+    return in_turn(codes([*zip(*keys, strict=True)])).astype(np.float64)
 
 
 def split_names(labels: Sequence[str]) -> tuple[list[str | None], Floats] | None:
@@ -132,8 +127,7 @@ def _of_names(labels: Sequence[str]) -> dict[str, Floats] | None:
     letters = [_LETTER.findall(label) for label in labels]
     if all(len(one) == 1 for one in letters) and len({one[0] for one in letters}) > 1:
         labels = [_LETTER.sub(lambda of: f"_ball{ord(of[0].upper()) - ord('A') + 1}", label) for label in labels]
-    split = split_names(labels)
-    if split is None:
+    if (split := split_names(labels)) is None:
         return None
     known, numbers = split
     for i, word in enumerate(_WORD.findall(labels[0])):
@@ -141,8 +135,8 @@ def _of_names(labels: Sequence[str]) -> dict[str, Floats] | None:
             known[i] = {"p": MEASUREMENT, "m": REPEAT}.get(word.casefold(), known[i])
     columns = NUMBERS[: len(known)]
     claimed = [column for column in known if column in columns]
+    left = iter([column for column in columns if column not in claimed])
     if len(set(claimed)) < len(claimed):
         return None
-    left = iter([column for column in columns if column not in claimed])
     order = [column if column in columns else next(left) for column in known]
     return {column: numbers[:, order.index(column)] for column in columns}

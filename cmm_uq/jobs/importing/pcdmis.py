@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
@@ -44,42 +43,35 @@ class PcDmis(TextReport):
     shows = (_HEADING, re.compile(rf"^[ \t]*DIM\s|(?:{_WORDS['units']})\s*=", re.MULTILINE | re.IGNORECASE))
 
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
-        every, others = _places(lines, where)
+        found = dimensions(lines, where)
+        every = [
+            ReportedPlace(of[1], one.line, one.unit, one.name, of[0],
+                          {axis: one.measured(axis) for axis in AXES if axis in one.rows})
+            for one in found if (of := one.location_of) is not None
+        ]  # fmt: skip
         located = {place.sort.upper() for place in every if len(place.xyz) == len(AXES)}
         places = [place for place in every if place.xyz and place.sort.upper() in located]
-        odd = [place for place in places or every if 0 < len(place.xyz) < len(AXES)]
-        if odd:
+        if odd := [place for place in places or every if 0 < len(place.xyz) < len(AXES)]:
             missing = next(axis for axis in AXES if axis not in odd[0].xyz)
             problem = f"{odd[0].dimension}, the place of {odd[0].feature}, has no {missing}"
             fix = "Report X, Y and Z of every feature; if it is the last one, the file was cut off"
             raise CmmUqError(problem, where=f"{where} line {odd[0].line}", fix=fix)
-        if not places and (rows := _lengths(lines, where)):
-            facts = facts_of(
-                encoding, "dimensions_not_used", say("Dimensions that are no place"), others + len(every) - len(rows)
-            )
-            unit = dimensions(lines, where)[0].unit or None
-            return [
-                replace(one, rows=[["name", "nominal", "measured"], *one.rows[1:]])
-                for one in sheets_of(rows, ["name", "nominal", "measured"], unit=unit, facts=facts)
-            ]
-        if not places:
-            problem = f"reports {others + len(every)} dimensions and no place of a feature by X, Y and Z"
-            raise NotReadError(
-                problem, where=where, fix="Report the location of every ball or point with its X, Y and Z"
-            )
-        units = {place.unit.upper(): place for place in places}
-        if len(units) > 1:
-            first, second = islice(units.values(), 2)
-            raise CmmUqError(
-                f"{first.dimension} is in {first.unit} and {second.dimension} in {second.unit}",
-                where=f"{where} line {second.line}",
-                fix="Report all dimensions in one unit",
-            )
         if len({place.feature for place in places}) < len(places):  # one feature, measured again
             places = [replace(place, feature=place.dimension) for place in places]
-        unused = others + len(every) - len(places)
-        facts = facts_of(encoding, "dimensions_not_used", say("Dimensions that are no place"), unused)
-        return sheets_of([place.row for place in places], WITH_DIRECTION[:4], unit=places[0].unit, facts=facts)
+        rows, headings = [place.row for place in places], WITH_DIRECTION[:4]
+        if not places:
+            rows, headings = _lengths(found), ["name", "nominal", "measured"]
+        if not rows:
+            problem = f"reports {len(found)} dimensions and no place of a feature by X, Y and Z"
+            fix = "Report the location of every ball or point with its X, Y and Z"
+            raise NotReadError(problem, where=where, fix=fix)
+        if len(units := [*{place.unit.upper(): place for place in places}.values()]) > 1:
+            problem = " and ".join(f"{one.dimension} {'is ' * (one is units[0])}in {one.unit}" for one in units[:2])
+            raise CmmUqError(problem, where=f"{where} line {units[1].line}", fix="Report all dimensions in one unit")
+        facts = facts_of(encoding, "dimensions_not_used", say("Dimensions that are no place"), len(found) - len(rows))
+        unit = places[0].unit if places else found[0].unit or None
+        sheets = sheets_of(rows, headings, unit=unit, facts=facts)
+        return sheets if places else [replace(one, rows=[headings, *one.rows[1:]]) for one in sheets]
 
 
 _TITLE = re.compile(rf"^[ \t]*(?P<sort>{_WORDS['features']})[ \t]*[:=][ \t]*(?P<of>\S+)", re.IGNORECASE | re.MULTILINE)
@@ -142,7 +134,7 @@ class Dimension:
     line: int
     rows: dict[
         str, tuple[str, dict[str, int], str]
-    ]  # by axis, its line, where the heading's words end, and place in messages
+    ]  # by axis, its line, where a heading's words end, place in messages
 
     def measured(self, axis: str) -> str:
         """The figure below MEAS, which differs from that below NOMINAL by that below DEV where these are printed."""
@@ -182,20 +174,9 @@ def dimensions(lines: Sequence[str], where: str) -> list[Dimension]:
     return found
 
 
-def _places(lines: Sequence[str], where: str) -> tuple[list[ReportedPlace], int]:
-    """Locations of features, and the number of other dimensions."""
-    places: list[ReportedPlace] = []
-    every = dimensions(lines, where)
-    for one in every:
-        if (of := one.location_of) is not None:
-            xyz = {axis: one.measured(axis) for axis in AXES if axis in one.rows}
-            places.append(ReportedPlace(of[1], one.line, one.unit, one.name, of[0], xyz))
-    return places, len(every) - len(places)
-
-
-def _lengths(lines: Sequence[str], where: str) -> list[Row]:
+def _lengths(found: Sequence[Dimension]) -> list[Row]:
     """Distances whose names number their line and their length, as ``LINE1_L2_RUN3``, with what is nominal and measured."""
-    every = [one for one in dimensions(lines, where) if "M" in one.rows]
+    every = [one for one in found if "M" in one.rows]
     if len(every) < 2 or split_names([one.name for one in every]) is None:
         return []
     below = [_below(*one.rows["M"]) for one in every]
@@ -211,19 +192,17 @@ def _ends(heading: str) -> dict[str, int]:
 
 def _below(content: str, ends: dict[str, int], place: str) -> dict[str, str]:
     """Figures by the word of the heading that they stand below."""
-    if not ends:
-        raise CmmUqError("figures stand ahead of any heading line AX … MEAS", where=place, fix="Print the report again")
-    below: dict[str, str] = {}
-    for figure in _NUMBER.finditer(content):
+    problem, below = "", dict[str, str]()
+    for figure in _NUMBER.finditer(content) if ends else ():
         below.setdefault(min(ends, key=lambda word: abs(ends[word] - figure.end())), figure[0])
-    if "MEAS" not in below:
-        raise CmmUqError("no measured value stands below MEAS", where=place, fix="Print the report again")
-    if {"NOMINAL", "DEV"} <= set(ends) and not _agree(below, toleranced=_CONDITION.match(content) is not None):
-        raise CmmUqError(
-            f"MEAS {below['MEAS']} is not NOMINAL and DEV together: the line is damaged",
-            where=place,
-            fix="Print the report again",
-        )
+    if not ends:
+        problem = "figures stand ahead of any heading line AX … MEAS"
+    elif "MEAS" not in below:
+        problem = "no measured value stands below MEAS"
+    elif {"NOMINAL", "DEV"} <= set(ends) and not _agree(below, toleranced=_CONDITION.match(content) is not None):
+        problem = f"MEAS {below['MEAS']} is not NOMINAL and DEV together: the line is damaged"
+    if problem:
+        raise CmmUqError(problem, where=place, fix="Print the report again")
     return below
 
 

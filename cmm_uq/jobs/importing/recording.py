@@ -7,9 +7,10 @@ those of a recording is kept as a covariate.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import compress
 from pathlib import PurePath
 
@@ -21,7 +22,6 @@ from cmm_uq.base.files.csv_table import GIVE, GIVE_OR_REMOVE, MEASURE, cells_of,
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
-from cmm_uq.jobs.arms import coordinates, required_columns
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest, misnamed
 from cmm_uq.jobs.importing.answers import head_of
 from cmm_uq.jobs.importing.columns import columns_of
@@ -38,19 +38,11 @@ from cmm_uq.jobs.importing.format import (
     length_named,
     sheets_of,
 )
-from cmm_uq.jobs.importing.header import (
-    LINES_BEFORE,
-    POINTS,
-    REFERENCES,
-    Header,
-    header_of,
-    names_axes,
-    no_header,
-)
-from cmm_uq.jobs.importing.interferometer import placed_runs
-from cmm_uq.jobs.importing.lengths import COLUMNS, MeasuredLengths, placed
+from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of, names_axes, no_header
+from cmm_uq.jobs.importing.lines import COLUMNS, MeasuredLengths, axis_runs, placed, placed_runs
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
+from cmm_uq.jobs.machines import coordinates, required_columns
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
@@ -68,10 +60,8 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
     header, whole = cells.header, [len(row) == len(cells.header) for row in cells.rows]
     for row, line in zip(cells.rows, cells.lines, strict=True):
         if len(row) != len(header):
-            wrong.add(CmmUqError(
-                f"has {len(row)} cells where the header has {len(header)}", where=f"{name} line {line}",
-                fix="Complete the row; if it is the last one, the file was cut off: export it again",
-            ))  # fmt: skip
+            fix = "Complete the row; if it is the last one, the file was cut off: export it again"
+            wrong.tell(f"has {len(row)} cells where the header has {len(header)}", where=f"{name} line {line}", fix=fix)
     if not cells.rows:
         raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
     rows, lines = list(compress(cells.rows, whole)), list(compress(cells.lines, whole))
@@ -79,16 +69,16 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
         _check_header(header, name, needed := required_columns(machine, header))
     if not set(needed) <= set(header):
         wrong.refuse()  # the cells of another table are another's
-
-    def column_of(i: int) -> Floats:
-        fix = MEASURE if header[i] in COORDINATES else GIVE if header[i] in REQUIRED else GIVE_OR_REMOVE
-        return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}", fix)
-
     for i, column in enumerate(header):
+        fix = MEASURE if column in COORDINATES else GIVE if column in REQUIRED else GIVE_OR_REMOVE
         if column not in without:
             with wrong.going_on():
-                table[column] = column_of(i)
+                table[column] = numbers([row[i] for row in rows], partial(_place, name, lines, column), fix)
     return points_of(table, lines, name, machine, wrong)
+
+
+def _place(name: str, lines: Sequence[int], column: str, row: int) -> str:
+    return f"{name} line {lines[row]}" + (f", column {column}" if column else "")
 
 
 def points_of(
@@ -97,50 +87,40 @@ def points_of(
     """Points of the columns of a recording, each (n,), the required ones among them."""
     wrong = wrong or Gathered()
 
-    def refuse(bad: NDArray[np.bool_], problem: Callable[[float], str], fix: str, column: str, of: Floats) -> None:
+    def refuse(bad: NDArray[np.bool_], problem: str, fix: str, column: str, of: Floats) -> None:
         if bad.any():
             row = int(np.argmax(bad))
-            at = f"{name} line {lines[row]}" + (f", column {column}" if column else "")
-            wrong.add(CmmUqError(problem(of[row]), where=at, fix=fix))
+            wrong.tell(problem.format(of[row]), where=_place(name, lines, column, row), fix=fix)
 
     for column, values in table.items():
         if column not in WHOLE:
             most = largest(column)
-            refuse(np.abs(values) > most, "{:g} is more than anything that is measured".format,
+            refuse(np.abs(values) > most, "{:g} is more than anything that is measured",
                    f"{most:g} is the most: check its unit and its exponent", column, values)  # fmt: skip
     # normals are brought to unit length where they are used: a direction must be meant
     if all(f"n{axis}" in table for axis in "xyz"):
         length = np.sqrt(sum(table[f"n{axis}"] ** 2 for axis in "xyz"))
-        refuse((length != 0) & ((length < SHORTEST_NORMAL) | (length > LONGEST_NORMAL)),
-               "the normal nx, ny, nz has the length {:.3g}".format, "Give outward unit normals", "", length)  # fmt: skip
-    for column in WHOLE:
-        values = table.get(column, np.zeros(0))
-        refuse((values != np.round(values)) | (np.abs(values) > LARGEST_NUMBER), "{:g} is not a whole number".format,
+        bad = (length != 0) & ((length < SHORTEST_NORMAL) | (length > LONGEST_NORMAL))
+        refuse(bad, "the normal nx, ny, nz has the length {:.3g}", "Give outward unit normals", "", length)
+    for column in (one for one in WHOLE if one in table):
+        values = table[column]
+        refuse((values != np.round(values)) | (np.abs(values) > LARGEST_NUMBER), "{:g} is not a whole number",
                "Number measurements, points and repeats 1, 2, …", column, values)  # fmt: skip
-    for column in ("approach_x", "approach_y", "approach_z"):
-        values = table.get(column, np.zeros(0))
-        refuse(~np.isin(values, (-1, 0, 1)), "{:g} is no direction".format,
-               "The direction of travel into the point is −1, 0 or +1", column, values)  # fmt: skip
+    for column in (one for one in ("approach_x", "approach_y", "approach_z") if one in table):
+        refuse(~np.isin(table[column], (-1, 0, 1)), "{:g} is no direction",
+               "The direction of travel into the point is −1, 0 or +1", column, table[column])  # fmt: skip
     wrong.refuse()
     measurement, point, repeat = (table.get(column, np.ones(len(lines))).astype(np.int64) for column in WHOLE)
     seen: dict[tuple[int, int, int], int] = {}
     for key, line in zip(zip(*map(np.ndarray.tolist, (measurement, point, repeat)), strict=True), lines, strict=True):
         if key in seen:
-            raise CmmUqError(
-                f"measurement {key[0]}, point {key[1]}, repeat {key[2]} is there twice",
-                where=f"{name} lines {seen[key]} and {line}", fix="Number repeated measurements in a column repeat",
-            )  # fmt: skip
+            said = f"measurement {key[0]}, point {key[1]}, repeat {key[2]} is there twice"
+            fix = "Number repeated measurements in a column repeat"
+            raise CmmUqError(said, where=f"{name} lines {seen[key]} and {line}", fix=fix)
         seen[key] = line
     columns = {column: values for column, values in table.items() if column not in (*REQUIRED, "repeat")}
-    return Points(
-        coordinates(machine, table, lines, name),
-        measurement,
-        point,
-        repeat,
-        machine,
-        columns,
-        np.array(lines, dtype=np.int64),
-    )
+    xyz = coordinates(machine, table, lines, name)
+    return Points(xyz, measurement, point, repeat, machine, columns, np.array(lines, dtype=np.int64))
 
 
 def _check_header(header: Sequence[str], name: str, needed: Sequence[str]) -> None:
@@ -151,17 +131,17 @@ def _check_header(header: Sequence[str], name: str, needed: Sequence[str]) -> No
     wrong = Gathered()
     for i, column in enumerate(header):
         if not column:
-            wrong.add(CmmUqError(f"column {i + 1} has no name", where=where, fix="Name it, or remove it"))
+            wrong.tell(f"column {i + 1} has no name", where=where, fix="Name it, or remove it")
         elif column in header[:i]:
-            wrong.add(CmmUqError(f"the column {column!r} is there twice", where=where, fix="Keep one"))
+            wrong.tell(f"the column {column!r} is there twice", where=where, fix="Keep one")
         elif problem := column_problem(column):
-            wrong.add(CmmUqError(problem, where=where, fix="Name it with letters, digits and _"))
+            wrong.tell(problem, where=where, fix="Name it with letters, digits and _")
         elif wrong_name := misnamed(column, header):
-            wrong.add(CmmUqError(wrong_name[0], where=where, fix=wrong_name[1]))
+            wrong.tell(wrong_name[0], where=where, fix=wrong_name[1])
     for column in needed:
         if column not in header:
             unread = " (of an axis that nobody reads, give one number in all rows)" * (column in COORDINATES)
-            wrong.add(CmmUqError(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}"))
+            wrong.tell(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}")
     wrong.refuse()
 
 
@@ -182,12 +162,6 @@ class UnplacedError(CmmUqError):
         self.recognised, self.lengths = recognised, lengths
 
 
-def _raw_head(sheets: Sequence[Sheet], sheet: Sheet, line: int) -> tuple[str, ...]:
-    """Texts of the row of a file that names columns."""
-    same = (one for one in sheets if one.name == sheet.name)
-    return next((tuple(head_of(one.rows[one.lines.index(line)])) for one in same if line in one.lines), ())
-
-
 def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> ImportedTable:
     """A recording in any format that is known."""
     table = _imported(content, where, keys, POINTS, reach_mm)
@@ -197,13 +171,10 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
     if not others or any(name.startswith("reference_") and name.endswith("_mm") for name in columns):
         return table
     # of the measured point, not of a certificate
-    unused = Fact(
-        "uncertainties_not_used", say("Uncertainties not used"), commas(names([headings[name] for name in others]))
-    )
-    recognised = replace(
-        table.recognised, columns={name: heading for name, heading in headings.items() if name not in others},
-        facts=(*table.recognised.facts, unused),
-    )  # fmt: skip
+    left = commas(names([headings[name] for name in others]))
+    unused = Fact("uncertainties_not_used", say("Uncertainties not used"), left)
+    taken = {name: heading for name, heading in headings.items() if name not in others}
+    recognised = replace(table.recognised, columns=taken, facts=(*table.recognised.facts, unused))
     used = {name: values for name, values in columns.items() if name not in others}
     return replace(table, columns=used, recognised=recognised)
 
@@ -220,11 +191,11 @@ def _imported(
     content: bytes, where: str, keys: ImportKeys, wanted: Sequence[Sequence[str]], reach_mm: float | None
 ) -> ImportedTable:
     if len(content) > TABLE_BYTES.most:
-        raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
-                         fix="Split it")  # fmt: skip
+        problem = f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file"
+        raise CmmUqError(problem, where=where, fix="Split it")
     form, file = format_of(content, where), PurePath(where).name
     recognised = Recognition(file, form.name, form.title, (), {}, 0)
-    problem: CmmUqError | None = None
+    problem_: CmmUqError | None = None
     try:
         sheets = _sheets_of(form, content, where, keys)
         sheet, header = _chosen(sheets, keys, where, wanted)
@@ -232,42 +203,43 @@ def _imported(
             map(names_axes, sheet.rows[header.first + 1 :])
         ):
             raise NotReadError("its head comes again", where=sheet.at(where, header.row), fix="Export one table")
-        head = _raw_head(sheets, sheet, sheet.lines[header.row]) if header.row < header.first else ()
+        head = tuple(head_of(sheet.rows[header.row])) if header.row < header.first else ()
         return _points(sheet, header, keys, where, reach_mm, replace(recognised, head=head), points=wanted is POINTS)
     except NotReadError as error:
-        problem = error
+        problem_ = error
     if wanted is POINTS and {*keys.columns} <= {*COLUMNS, *OPTIONAL, *WHOLE}:
         understood = understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines)
         if understood is not None:
             return _understood(understood, keys, where, reach_mm, recognised)
-    raise problem or no_header(sheets, keys, where, wanted)
+    raise problem_ or no_header(sheets, keys, where, wanted)
 
 
 def _understood(
     understood: Understanding, keys: ImportKeys, where: str, reach_mm: float | None, begun: Recognition
 ) -> ImportedTable:
     """A recording of what was understood of a file."""
-    head, grid = understood.header, understood.grid
-    begun = replace(begun, head=tuple(head_of(grid.sheet.rows[head.row])) if head.row < head.first else ())
-    if understood.kind == "lengths":
-        lengths = understood.lengths(keys, where, reach_mm)
-        keys = keys.model_copy(update={"lines": {**understood.places, **keys.lines}})
-        recognised = replace(begun, facts=lengths.facts, columns=lengths.sources, points=2 * len(lengths.names))
-        try:
-            columns, of_lines, lines = placed([lengths], keys, where)
-        except CmmUqError as error:
-            raise UnplacedError(error, recognised, [lengths]) from None
-        return ImportedTable(columns, np.array(lines), replace(recognised, facts=(*lengths.facts, *of_lines)))
-    if understood.kind == "runs":
-        sheet = placed_runs(understood.runs(where), keys, where)[0]
+    head, reading = understood.header, understood.reading
+    begun = replace(begun, head=tuple(head_of(understood.grid.sheet.rows[head.row])) if head.row < head.first else ())
+    if reading.kind == "runs":
+        runs = axis_runs(reading, understood.sheets, where)
+        sheet = placed_runs(runs, keys, where)[0]
         header = header_of(sheet, keys.model_copy(update={"columns": {}}), where, POINTS)
         assert header is not None  # of the head that was written  # noqa: S101
         return _points(sheet, header, keys, where, reach_mm, begun, points=True)
-    columns, facts = understood.points(keys, where, reach_mm)
-    lines_ = understood.reading.lines
-    return ImportedTable(
-        columns, np.array(lines_), replace(begun, facts=facts, columns=understood.sources, points=len(lines_))
-    )
+    lines = reading.lines
+    if reading.kind == "points":
+        columns, facts = understood.points(keys, where, reach_mm)
+    else:
+        lengths = understood.lengths(keys, where, reach_mm)
+        keys, facts = keys.model_copy(update={"lines": {**understood.places, **keys.lines}}), lengths.facts
+        try:
+            columns, of_lines, lines = placed(lengths, keys, where)
+        except CmmUqError as error:
+            found = replace(begun, facts=facts, columns=lengths.sources, points=2 * len(lengths.names))
+            raise UnplacedError(error, found, [lengths]) from None
+        facts += of_lines
+    found = replace(begun, facts=facts, columns=understood.sources, points=len(lines))
+    return ImportedTable(columns, np.array(lines), found)
 
 
 def _alternatives(form: Format, content: bytes, where: str, keys: ImportKeys) -> Iterator[Sequence[Sheet]]:
@@ -281,19 +253,12 @@ def _alternatives(form: Format, content: bytes, where: str, keys: ImportKeys) ->
 
 
 def _points(
-    sheet: Sheet,
-    header: Header,
-    keys: ImportKeys,
-    where: str,
-    reach_mm: float | None,
-    begun: Recognition,
-    *,
-    points: bool,
-) -> ImportedTable:
+    sheet: Sheet, header: Header, keys: ImportKeys, where: str, reach_mm: float | None, begun: Recognition, *, points: bool
+) -> ImportedTable:  # fmt: skip
     values, lines, sources, facts = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=points)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
-    facts = (*named, *sheet.facts, *facts)
-    return ImportedTable(values, lines, replace(begun, facts=facts, columns=sources, points=len(lines)))
+    found = replace(begun, facts=(*named, *sheet.facts, *facts), columns=sources, points=len(lines))
+    return ImportedTable(values, lines, found)
 
 
 def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet], list[tuple[Sheet, Header]]]:
@@ -307,12 +272,10 @@ def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet]
         return sheets, [(sheet, header)]
     with suppress(CmmUqError):
         if found := understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines):
-            if found.kind == "points" and len(found.reading.taken) == 1:  # a row for each coordinate, shown as points
+            if found.reading.kind == "points" and len(found.reading.taken) == 1:  # a row for each coordinate, as points
                 columns, _ = found.points(keys, where, None)
-                rows = [
-                    ("", [f"{cell:.9g}" for cell in row], line)
-                    for *row, line in zip(*columns.values(), found.reading.lines, strict=True)
-                ]
+                cells = ([f"{cell:.9g}" for cell in row] for row in zip(*columns.values(), strict=True))
+                rows = [("", row, line) for row, line in zip(cells, found.reading.lines, strict=True)]
                 sheets = sheets_of(rows, [*columns], unit="mm")
                 return sheets, [(sheets[0], Header(0, 1, [*columns], {name: (i,) for i, name in enumerate(columns)}))]
             return [*found.sheets], [(found.grid.sheet, found.header)]
@@ -384,8 +347,8 @@ def example(read: ImportedTable | Sequence[MeasuredLengths]) -> str:
         first = {name: values[0] for name, values in read.columns.items()}
         numbers = " ".join(f"{name} {first[name]:g}," for name in WHOLE if name in first)
         return f"{numbers} {', '.join(f'{name[0]} {first[name]:.4f} mm' for name in COORDINATES)}"
-    one = read[0]
-    nominal = one.reference[0]
-    of = "" if nominal is None else f"{nominal:.4f} mm measured as "
-    error = "" if nominal is None else f", {1000 * (one.measured[0] - nominal):+.4g} µm"
-    return f"line {one.names[0]}, run {one.repeat[0]}: {of}{one.measured[0]:.4f} mm{error}"
+    one, measured, nominal = read[0], read[0].measured[0], read[0].reference[0]
+    of, error = "", ""
+    if nominal is not None:
+        of, error = f"{nominal:.4f} mm measured as ", f", {1000 * (measured - nominal):+.4g} µm"
+    return f"line {one.names[0]}, run {one.repeat[0]}: {of}{measured:.4f} mm{error}"

@@ -32,9 +32,8 @@ class TextReport(Format):
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         text, encoding = decoded(content, where, keys.encoding)
-        return self.sheets(
-            report_lines(text, where), where, keys, Fact("encoding", say("Encoding"), Verbatim(encoding))
-        )
+        lines = report_lines(text, where)
+        return self.sheets(lines, where, keys, Fact("encoding", say("Encoding"), Verbatim(encoding)))
 
     @abstractmethod
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
@@ -234,26 +233,23 @@ class Qdas(TextReport):
 
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
         said: dict[tuple[str, str], str] = {}
-        counted: dict[str, int] = {}
+        counted = Counter[str]()
         rows: list[Row] = []
         for line, content in enumerate(lines, 1):
-            if (match := _FIELD.fullmatch(content.strip())) is None:
-                if content.strip():
-                    raise NotReadError(
-                        "has no key K", where=f"{where} line {line}", fix="Export values with keys (K0001/1 …)"
-                    )
+            if not content.strip():
                 continue
+            match, at = _FIELD.fullmatch(content.strip()), f"{where} line {line}"
+            if match is None:
+                raise NotReadError("has no key K", where=at, fix="Export values with keys (K0001/1 …)")
             key, which, text = match.groups()
             said[key, which or "0"] = text
             if key == "0002" and text.strip() != "0":
-                raise NotReadError("marks a value as invalid (K0002)", where=f"{where} line {line}", fix="Take it out")
+                raise NotReadError("marks a value as invalid (K0002)", where=at, fix="Take it out")
             if key == "0001":
                 name, nominal = (said.get((one, which), "") for one in ("2002", "2101"))
                 if not which or not nominal:
-                    raise NotReadError(
-                        "has no nominal value (K2101)", where=f"{where} line {line}", fix="Export K2001 ff. too"
-                    )
-                counted[which] = counted.get(which, 0) + 1
+                    raise NotReadError("has no nominal value (K2101)", where=at, fix="Export K2001 ff. too")
+                counted[which] += 1
                 rows.append(("", [name or which, f"{counted[which]}", nominal, text], line))
         units = {text for (key, _), text in said.items() if key == "2142"}
         if len(units) > 1:
@@ -342,9 +338,7 @@ def in_pairs(text: str) -> list[list[str]] | None:
     if count < _LEAST or 2 * count < sum(map(bool, lines)):
         return None
     alike = [tuple(name for name, _ in own) == form for own in pairs]
-    if (first := alike.index(True)) == 0:
-        return None
-    rows = [
-        [value for _, value in own] if same else [line] for line, own, same in zip(lines, pairs, alike, strict=True)
-    ]
-    return [*rows[: first - 1], [*form], *rows[first:]]
+    each = zip(lines, pairs, alike, strict=True)
+    rows = [[value for _, value in own] if same else [line] for line, own, same in each]
+    first = alike.index(True)
+    return [*rows[: first - 1], [*form], *rows[first:]] if first else None

@@ -41,7 +41,7 @@ _NUMBER = re.compile(r"[±+-]?\d[\d.,]*%?|[±+-]?[.,]\d+")
 _LINES = re.compile(r"\s*[\r\n]\s*")  # of a heading in a cell
 _KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
-Rows = tuple[list[list[str]], list[int]]  # cells of every line, and their lines
+Rows = tuple[list[list[Any]], list[int]]  # cells of every line, and their lines
 
 
 class Delimited(Format):
@@ -81,13 +81,13 @@ def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
 def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> Rows:
     """Of every line, or of the first ``most``."""
     if delimiter == _BLANK:
-        return _filled(enumerate(in_columns(list(islice(lines_within(text, where), most))), 1), where)
+        return _filled(enumerate(in_columns(list(islice(lines_within(text, where), most))), 1), f"{where} line")
     if '"' not in text:
         return _unquoted(text, delimiter, where, most)
     reader = csv.reader(lines_within(text, where), delimiter=delimiter, skipinitialspace=True)
     rows: Rows = ([], [])
     try:
-        return _filled(islice(((reader.line_num, row) for row in reader), most), where, rows)
+        return _filled(islice(((reader.line_num, row) for row in reader), most), f"{where} line", rows)
     except csv.Error as error:
         if most is not None:
             return rows
@@ -102,30 +102,27 @@ def alternatives(content: bytes, where: str, keys: ImportKeys) -> Iterator[list[
         if candidate in text:
             yield [Sheet("", *_rows(text, candidate, where), facts=_facts(encoding, candidate))]
     if (rows := in_pairs(text)) is not None and keys.delimiter is None:
-        yield [Sheet("", *_filled(enumerate(rows, 1), where), facts=_facts(encoding, _BLANK)[:1])]
+        yield [Sheet("", *_filled(enumerate(rows, 1), f"{where} line"), facts=_facts(encoding, _BLANK)[:1])]
 
 
 def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:
-    return (
-        Fact("encoding", say("Encoding"), Verbatim(encoding)),
-        Fact("delimiter", say("Between cells"), _TITLES[delimiter]),
-    )
+    between = Fact("delimiter", say("Between cells"), _TITLES[delimiter])
+    return Fact("encoding", say("Encoding"), Verbatim(encoding)), between
 
 
 def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
     """Cells of lines by where they stand: columns are where figures stand below each other, heads go to the nearest."""
-    tokens = [[(m.start(), m.end(), m[0]) for m in _TOKEN.finditer(line.expandtabs())] for line in lines]
-    figured = [len([t for t in own if _NUMBER.fullmatch(t[2])]) for own in tokens]
-    counted = [
-        2 * n >= len(own) > 0
-        and (n > 1 or (len(own) <= 3 and any(_POINT.search(t[2]) for t in own)))
-        and not (n > 2 and any(places_in(line, sign) for sign in ".,"))
-        and not _in_words([t[2] for t in own])
-        for n, own, line in zip(figured, tokens, lines, strict=True)
-    ]
-    spans = _spans([t for own, is_row in zip(tokens, counted, strict=True) if is_row for t in own])
+    lines = [line.expandtabs() for line in lines]
+    tokens = [[(m.start(), m.end(), m[0]) for m in _TOKEN.finditer(line)] for line in lines]
+    counted = [_is_row([text for _, _, text in own], line) for own, line in zip(tokens, lines, strict=True)]
+    spans: list[tuple[int, int]] = []  # where tokens stand, those that overlap together
+    for start, end, _ in sorted(t for own, is_row in zip(tokens, counted, strict=True) if is_row for t in own):
+        if spans and start < spans[-1][1]:
+            spans[-1] = (spans[-1][0], max(spans[-1][1], end))
+        else:
+            spans.append((start, end))
     for own, is_row, line in zip(tokens, counted, lines, strict=True):
-        phrases = own if is_row else [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line.expandtabs())]
+        phrases = own if is_row else [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line)]
         if not is_row and len(phrases) < 2 and (not phrases or phrases[0][0] < 8):
             yield [line.strip()]
             continue
@@ -134,31 +131,23 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
             continue
         cells = [""] * max(1, len(spans))
         for start, end, text in phrases:
-            over = [k for k, (a, b) in enumerate(spans) if a < end and start < b]
-            k = over[0] if over else min(range(len(spans)), key=lambda k: abs(spans[k][1] - end), default=0)
-            if is_row or not cells[k]:
-                cells[k] = f"{cells[k]} {text}".strip()
-            else:
-                cells[k] = f"{cells[k]} {text}"
+            over = (k for k, (a, b) in enumerate(spans) if a < end and start < b)
+            nearest = min(range(len(spans)), key=lambda k: abs(spans[k][1] - end), default=0)
+            k = next(over, nearest)
+            cells[k] = f"{cells[k]} {text}".strip() if is_row or not cells[k] else f"{cells[k]} {text}"
         yield cells
 
 
-def _in_words(texts: Sequence[str]) -> bool:
-    """Whether figures stand among words, as ``Mean 35.4339  Range 0.0006`` or ``9 elements, 36 characteristics``."""
+def _is_row(texts: Sequence[str], line: str) -> bool:
+    """Whether a line is a row of figures: no place of a line, and no figures among words (``Mean 35.4339  Range 0.0006``)."""
     numbers = [_NUMBER.fullmatch(text) is not None for text in texts]
-    apart = sum(numbers) > 1 and not any(a and b for a, b in pairwise(numbers))
-    return apart and not (numbers[0] and any(_POINT.search(text) for text in compress(texts, numbers)))
-
-
-def _spans(tokens: Sequence[tuple[int, int, str]]) -> list[tuple[int, int]]:
-    """Where tokens stand, those that overlap together."""
-    spans: list[tuple[int, int]] = []
-    for start, end, _ in sorted(tokens):
-        if spans and start < spans[-1][1]:
-            spans[-1] = (spans[-1][0], max(spans[-1][1], end))
-        else:
-            spans.append((start, end))
-    return spans
+    n, printed = sum(numbers), any(_POINT.search(text) for text in texts)
+    if 2 * n < len(texts) or not (n > 1 or (len(texts) <= 3 and n and printed)):
+        return False
+    if n > 2 and any(places_in(line, sign) for sign in ".,"):
+        return False
+    apart = n > 1 and not any(a and b for a, b in pairwise(numbers))
+    return not apart or (numbers[0] and any(_POINT.search(text) for text in compress(texts, numbers)))
 
 
 def _unquoted(text: str, delimiter: str, where: str, most: int | None) -> Rows:
@@ -170,32 +159,35 @@ def _unquoted(text: str, delimiter: str, where: str, most: int | None) -> Rows:
     rows = [line.split(delimiter) for line in lines]
     if lines and longest <= CELL.most and len(lines) <= ROWS.most and max(map(len, rows)) <= COLUMNS.most:
         # blanks around a cell, an empty cell at the end of a row, a line with nothing in it
-        edges = (
-            edge for blank in " \xa0" for edge in (f"\n{blank}", f"{blank}\n", delimiter + blank, blank + delimiter)
-        )
+        loose = [f"\n{blank}" for blank in " \xa0"] + [f"{blank}\n" for blank in " \xa0"] + ["\n\n", f"{delimiter}\n"]
+        loose += [edge for blank in " \xa0" for edge in (delimiter + blank, blank + delimiter)]
         joined = "\n".join(["", *lines, ""])
-        if not any(edge in joined for edge in ("\n\n", f"{delimiter}\n", *edges)):
+        if not any(edge in joined for edge in loose):
             return rows, list(range(1, len(rows) + 1))
-    return _filled(enumerate(rows, 1), where)
+    return _filled(enumerate(rows, 1), f"{where} line")
 
 
-def _filled(counted: Iterable[tuple[int, list[str]]], where: str, filled: Rows | None = None) -> Rows:
-    """Without empty cells at the ends of rows, and without empty rows; added to ``filled``."""
+def _filled(counted: Iterable[tuple[int, Sequence[Any]]], where: str, filled: Rows | None = None) -> Rows:
+    """Rows that are not empty, without empty cells at their ends, none beyond the limits of a table; added to ``filled``.
+
+    ``where`` : what the number of a row follows in messages.
+    """
     rows, lines = filled or ([], [])
     for line, row in counted:
-        if not (cells := _without_end([cell.strip() for cell in row])):
+        cells = _without_end([cell.strip() if isinstance(cell, str) else cell for cell in row])
+        if not cells:
             continue
-        longest = max(map(len, cells))
-        if len(cells) > COLUMNS.most or longest > CELL.most:
-            wide = len(cells) > COLUMNS.most
-            what, limit = (f"{len(cells)} cells", COLUMNS) if wide else (f"a cell of {longest} characters", CELL)
-            raise CmmUqError(f"has {what}, {limit.most} are the most", where=f"{where} line {line}",
-                             fix="Export the columns that are needed; close every quotation mark on its own line")  # fmt: skip
+        _check_width(len(cells), f"{where} {line}")
+        longest = max((len(cell) for cell in cells if isinstance(cell, str)), default=0)
+        problem, fix = "", "Shorten it, and close every quotation mark on its own line"
+        if longest > CELL.most:
+            problem = f"has a cell of {longest} characters, {CELL.most} are the most"
+        elif len(rows) >= ROWS.most + LINES_BEFORE:
+            problem, fix = f"goes on after {len(rows)} rows: {ROWS.most} are the most", "Split or thin out the table"
+        if problem:
+            raise CmmUqError(problem, where=f"{where} {line}", fix=fix)
         rows.append(cells)
         lines.append(line)
-    if len(rows) > ROWS.most + LINES_BEFORE:
-        problem = f"has {len(rows)} rows, {ROWS.most} are the most"
-        raise CmmUqError(problem, where=where, fix="Split or thin out the table")
     return rows, lines
 
 
@@ -242,23 +234,7 @@ def _opened(content: bytes, where: str) -> zipfile.ZipFile:
 
 
 def _sheet(name: str, counted: Iterable[tuple[int, list[Cell]]], where: str) -> Sheet:
-    """A sheet of rows that are not empty, none beyond the limits of a table."""
-    rows: list[list[Cell]] = []
-    lines: list[int] = []
-    for line, cells in counted:
-        place = f"{where}: {name} row {line}"
-        _check_width(len(cells), place)
-        if len(rows) >= ROWS.most + LINES_BEFORE:
-            raise CmmUqError(f"goes on after {len(rows)} rows: {ROWS.most} are the most", where=place,
-                             fix="Split or thin out the table")  # fmt: skip
-        longest = max((len(cell) for cell in cells if isinstance(cell, str)), default=0)
-        if longest > CELL.most:
-            raise CmmUqError(
-                f"has a cell of {longest} characters, {CELL.most} are the most", where=place, fix="Shorten it"
-            )
-        rows.append(cells)
-        lines.append(line)
-    return Sheet(name, rows, lines, spreadsheet=True)
+    return Sheet(name, *_filled(counted, f"{where}: {name} row"), spreadsheet=True)
 
 
 def _check_width(width: int, place: str) -> None:

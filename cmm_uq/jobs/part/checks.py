@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache
+from itertools import compress
 
 import numpy as np
 
@@ -92,12 +93,11 @@ def freedoms(datums: Sequence[tuple[Probed, ...]]) -> tuple[str, ...]:
     fixed = [_fixed(one, centre, size, alone=len(datum) == 1) for datum in datums for one in datum]
     rows = np.concatenate([np.zeros((0, 6)), *fixed])
     shifts, turns = _null(np.concatenate([rows, np.eye(6)[3:]]))[:, :3], _null(rows)[:, 3:]
-    return tuple(
-        f"{words} {axis}"
-        for words, motions in (("shift along", shifts), ("rotation about", turns))
-        for axis, moved in zip(AXES, np.linalg.norm(motions, axis=0), strict=True)
-        if moved > _FREE
-    )
+    free: list[str] = []
+    for words, motions in (("shift along", shifts), ("rotation about", turns)):
+        moved = np.linalg.norm(motions, axis=0) > _FREE
+        free += [f"{words} {axis}" for axis in compress(AXES, moved.tolist())]
+    return tuple(free)
 
 
 def _null(rows: Floats) -> Floats:
@@ -151,14 +151,14 @@ def check_names(facts: PartFile, places: Places, wrong: Gathered) -> None:
     for table, own in names.items():
         for i, name in enumerate(own):
             if name in own[:i]:
-                wrong.add(CmmUqError(f"the {table} {name!r} stands there twice", where=places.of(table, "name", i),
-                                     fix="Give each a name of its own"))  # fmt: skip
+                wrong.tell(f"the {table} {name!r} stands there twice", where=places.of(table, "name", i),
+                           fix="Give each a name of its own")  # fmt: skip
     styli, features = names["stylus"], names["feature"]
     for i, feature in enumerate(facts.feature):
         where = places.of("feature", "stylus", i)
         if not feature.stylus and len(styli) > 1:
             said = f"there are {len(styli)} styli, and {feature.name!r} does not say which probes it"
-            wrong.add(CmmUqError(said, where=where, fix=f"Give stylus = {styli[0]!r} or another"))
+            wrong.tell(said, where=where, fix=f"Give stylus = {styli[0]!r} or another")
         _known([feature.stylus] if feature.stylus else [], styli, "stylus", where, wrong)
     _datums(facts.alignment.datums, features, places.of("alignment", "datums"), wrong)
     for i, one in enumerate(facts.characteristic):
@@ -169,13 +169,13 @@ def check_names(facts: PartFile, places: Places, wrong: Gathered) -> None:
     left = [name for name in features if name not in order]
     if order and (left or len(order) != len(features)):
         said = f"leaves {left[0]!r} out" if left else "names a feature twice"
-        wrong.add(CmmUqError(said, where=where, fix="Name each feature once"))
+        wrong.tell(said, where=where, fix="Name each feature once")
 
 
 def _known(names: Sequence[str], known: Sequence[str], what: str, where: str, wrong: Gathered) -> None:
     for name in names:
         if name not in known:
-            wrong.add(CmmUqError(f"there is no {what} {name!r}", where=where, fix=suggestion(name, known)))
+            wrong.tell(f"there is no {what} {name!r}", where=where, fix=suggestion(name, known))
 
 
 def _datums(names: Sequence[str], known: Sequence[str], where: str, wrong: Gathered) -> None:
@@ -188,11 +188,11 @@ def _datums(names: Sequence[str], known: Sequence[str], where: str, wrong: Gathe
             condition = material_condition(name)
             problem = f"the datum {name!r} {condition}" if condition else error.problem
             fix = "Leave the characteristic out, and name it in [part] not_measured" if condition else error.fix
-            wrong.add(CmmUqError(problem, where=where, fix=fix))
+            wrong.tell(problem, where=where, fix=fix)
             continue
         if twice := [each for each in own if each in taken]:
             fix = "Name it in one of them"
-            wrong.add(CmmUqError(f"{twice[0]!r} stands in two of these datums", where=where, fix=fix))
+            wrong.tell(f"{twice[0]!r} stands in two of these datums", where=where, fix=fix)
         taken += own
 
 
@@ -283,11 +283,8 @@ def _of_its_kinds(one: CharacteristicFacts, features: Mapping[str, Probed]) -> P
 
 
 # what a common datum is
-_AS_ONE = {
-    "line": "an axis",
-    "plane": "a plane",
-    "point": "neither one axis nor one plane by the nominals of its features",
-}
+_AS_ONE = {"line": "an axis", "plane": "a plane"}
+_AS_ONE["point"] = "neither one axis nor one plane by the nominals of its features"
 
 
 def _association(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:

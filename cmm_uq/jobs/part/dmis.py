@@ -230,9 +230,8 @@ class _Program:
         self.stylus = name = reference(words[0] if words else "")[1]
         if name not in self.styli:
             self.styli[name] = {"name": name, "diameter_mm": 0.0}
-            raise NotUnderstoodError(
-                f"selects {name!r}, which this program does not define: its tip is taken as a point"
-            )
+            why = f"selects {name!r}, which this program does not define: its tip is taken as a point"
+            raise NotUnderstoodError(why)
 
     def _scanning(self, words: list[str]) -> None:
         self.scanning = bool(words) and words[0].upper() == "ON"

@@ -72,16 +72,15 @@ class Drawing:
 
         ``without``: names that may be left out, or :data:`ALL`.
         """
-        wrong = Gathered()
+        wrong, every = Gathered(), (*self.features, *self.characteristics)
         for one in self.unknown:
             if ALL not in without and one.name not in without:
-                wrong.add(CmmUqError(f"{one.name!r} {one.why}", where=one.where,
-                                     fix=f"Leave it out knowingly: --set part.not_measured='[\"{one.name}\"]', or "
-                                         f"'[\"{ALL}\"]' for all of these"))  # fmt: skip
-        named = {*(one.name for one in self.unknown), *(f["name"] for f in (*self.features, *self.characteristics))}
+                ways = f"--set part.not_measured='[\"{one.name}\"]', or '[\"{ALL}\"]' for all of these"
+                wrong.tell(f"{one.name!r} {one.why}", where=one.where, fix=f"Leave it out knowingly: {ways}")
+        named = {*(one.name for one in self.unknown), *(one["name"] for one in every)}
         for name in without:
             if name not in (ALL, *named):
-                wrong.add(CmmUqError(f"has nothing named {name!r}", where=where, fix=suggestion(name, named)))
+                wrong.tell(f"has nothing named {name!r}", where=where, fix=suggestion(name, named))
         wrong.refuse()
         for table in (self.features, self.characteristics):
             table[:] = [one for one in table if one["name"] not in without]
@@ -94,8 +93,8 @@ class Drawing:
         for table, what in ((self.features, "feature"), (self.characteristics, "tolerance")):
             if not table:
                 why = "; ".join(f"{one.name!r} {one.why}" for one in self.unknown[:_TOLD])
-                raise CmmUqError(f"holds no {what} that is understood{': ' if why else ''}{why}", where=where,
-                                 fix="Write the job by hand: cmm-uq new part")  # fmt: skip
+                problem = f"holds no {what} that is understood{why and f': {why}'}"
+                raise CmmUqError(problem, where=where, fix="Write the job by hand: cmm-uq new part")
         return list(dict.fromkeys([*(one.name for one in self.unknown), *(name for name in without if name != ALL)]))
 
 
@@ -157,14 +156,12 @@ def set_aside_unsound(drawing: Drawing, where: str) -> None:
         try:
             facts = CharacteristicFacts.model_validate(dict(given))
             named = [*facts.features, *(each for name in facts.datums for each in members(name, features))]
-            found = unfit(facts, features) if features.keys() >= set(named) else None
-            problem = found[0] if found else ""
+            if features.keys() >= set(named) and (found := unfit(facts, features)):
+                set_aside(drawing.characteristics, given, found[0])
         except ValidationError as error:
-            problem = _first(error)
+            set_aside(drawing.characteristics, given, _first(error))
         except CmmUqError:  # of a feature that was set aside: told where features are left out
-            problem = ""
-        if problem:
-            set_aside(drawing.characteristics, given, problem)
+            continue
 
 
 def _first(error: ValidationError) -> str:
@@ -187,11 +184,6 @@ def number_of(text: str) -> float:
         raise NotUnderstoodError(f"has {text!r} where a number belongs") from None
 
 
-def inside(element: Element, name: str) -> Element | None:
-    """The first element of this name in another; ``None`` where there is none."""
-    return next((inner for inner in element if local(inner) == name), None)
-
-
 def text(element: Element) -> str:
     return (element.text or "").strip()
 
@@ -211,27 +203,24 @@ class QifUnits:
     def __init__(self, root: Element, where: str) -> None:
         unit = length_unit(root, where)
         if unit is None:
-            linked = inside(root, "ExternalQIFReferences") is not None
+            linked = root.find("{*}ExternalQIFReferences") is not None
             also = ", and refers to other QIF documents, which are not read" if linked else ""
             fix = "Export one document with everything in it" if linked else "Export the plan with FileUnits"
             raise CmmUqError(f"does not say its unit of length{also}", where=where, fix=fix)
         name = UNITS[unit.casefold()]
         units = next((element for element in root.iter() if local(element) == "FileUnits"), root)
-        primary = inside(units, "PrimaryUnits")
+        primary = units.find("{*}PrimaryUnits")
         try:  # factors, in metres or radians
-            self._named = {
-                (sort, child(each, "UnitName")): _factor(each)
-                for each in units.iter() for sort in (_LINEAR, _ANGULAR) if local(each).endswith(sort)
-            }  # fmt: skip
+            sorts = (
+                (each, sort) for each in units.iter() for sort in (_LINEAR, _ANGULAR) if local(each).endswith(sort)
+            )
+            self._named = {(sort, child(each, "UnitName")): _factor(each) for each, sort in sorts}
             own = {local(each): _factor(each) for each in ([] if primary is None else primary)}
         except NotUnderstoodError as error:
             raise CmmUqError(f"a unit {error}", where=f"{where}: FileUnits", fix="Export the plan again") from None
-        mm, degrees = name.up / name.down, math.degrees(1.0) * own.get(_ANGULAR, 1.0)
-        self._usual = {_LINEAR: mm, _ANGULAR: degrees}
-        self._pmi = {
-            _LINEAR: _METRE_MM * own["PMILinearUnit"] if "PMILinearUnit" in own else mm,
-            _ANGULAR: math.degrees(own["PMIAngularUnit"]) if "PMIAngularUnit" in own else degrees,
-        }
+        self._usual = {_LINEAR: name.up / name.down, _ANGULAR: math.degrees(1.0) * own.get(_ANGULAR, 1.0)}
+        scales = ((_LINEAR, "PMILinearUnit", _METRE_MM), (_ANGULAR, "PMIAngularUnit", math.degrees(1.0)))
+        self._pmi = {sort: scale * own[key] if key in own else self._usual[sort] for sort, key, scale in scales}
 
     def mm(self, element: Element, *, pmi: bool = False) -> float:
         return number_of(text(element)) * self._scale(element, _LINEAR, pmi=pmi)
@@ -256,7 +245,7 @@ class QifUnits:
 
 
 def _factor(unit: Element) -> float:
-    return number_of(next((each.text or "" for each in unit.iter() if local(each) == "Factor"), "") or "1")
+    return number_of(unit.findtext(".//{*}Factor") or "1")
 
 
 @dataclass(frozen=True, eq=False)

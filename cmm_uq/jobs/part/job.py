@@ -12,7 +12,6 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES, text_of
 from cmm_uq.base.files.toml_file import checked
-from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.part.checks import check_names, check_plan
@@ -20,8 +19,8 @@ from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.part.values import Reported, reported_values
-from cmm_uq.jobs.reading import CERTIFICATES, WHOLE, further_named, job_toml
-from cmm_uq.jobs.source import RESULTS, FilesInFolder, FilesInMemory, JobFiles
+from cmm_uq.jobs.reading import CERTIFICATES, WHOLE, further_named, in_folder
+from cmm_uq.jobs.source import RESULTS, FilesInMemory, JobFiles
 from cmm_uq.jobs.tables.identification import check_examples, check_mark
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
@@ -54,9 +53,7 @@ def read_part(folder: Path, *, machine: bool = True) -> PartJob:
 
     ``machine``: whether the files that state the machine must be there.
     """
-    path = job_toml(folder)
-    finish_interrupted(path.parent)
-    return _read(FilesInFolder(path), machine=machine)
+    return _read(in_folder(folder), machine=machine)
 
 
 def part_of(files: Mapping[str, bytes], *, machine: bool = True) -> PartJob:

@@ -19,7 +19,7 @@ from cmm_uq.jobs.importing.documents import child, three
 from cmm_uq.jobs.importing.encodings import local, root_of
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN
-from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, inside, listed, number_of, text, whole_text
+from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, listed, number_of, text, whole_text
 from cmm_uq.jobs.part.feature import ASKS, What
 
 PROGRAM = "QIF plan"
@@ -96,7 +96,7 @@ class _Document:
         for item in planned or [one for one in self._all("FeatureNominal") if one.get("id", "") in labels]:
             self._named(item, "feature", self._feature, labels.get(item.get("id", ""), ""))
         for item in self._all("CharacteristicItem" if planned else "CharacteristicNominal"):
-            ids = listed(inside(item, "FeatureNominalIds"))
+            ids = listed(item.find("{*}FeatureNominalIds"))
             what = WHATS.get(local(item).removesuffix("CharacteristicNominal"))
             if planned or len(ids) < 2 or (what is not None and ASKS[what].features > 1):
                 self._named(item, "characteristic", self._characteristic)
@@ -120,8 +120,8 @@ class _Document:
     @staticmethod
     def _numbers(element: Element) -> list[str]:
         """Of nominal features that an element names, alone or in pairs."""
-        pairs = inside(element, "FeatureNominalPairs")
-        return [*listed(inside(element, "FeatureNominalIds")),
+        pairs = element.find("{*}FeatureNominalPairs")
+        return [*listed(element.find("{*}FeatureNominalIds")),
                 *(number for pair in ([] if pairs is None else pairs) for number in listed(pair))]  # fmt: skip
 
     def _all(self, ending: str) -> Iterator[Element]:
@@ -155,10 +155,10 @@ class _Document:
             raise NotUnderstoodError("is constructed of other features, which is not read")
         nominal = item if local(item).endswith("FeatureNominal") else self._referred(item, "FeatureNominalId")
         definition = self._referred(nominal, "FeatureDefinitionId")
-        if inside(nominal, "PointList") is not None:
+        if nominal.find("{*}PointList") is not None:
             raise NotUnderstoodError("has a list of points of its own (PointList), which is not read")
         found: Facts = {"name": name, "kind": sort.lower()}
-        if (algorithm := inside(nominal, "SubstituteFeatureAlgorithm")) is not None:
+        if (algorithm := nominal.find("{*}SubstituteFeatureAlgorithm")) is not None:
             if (word := whole_text(algorithm)) not in ASSOCIATIONS:
                 raise NotUnderstoodError(f"is to be associated by {word}, which is not read")
             found["association"] = ASSOCIATIONS[word]
@@ -168,26 +168,25 @@ class _Document:
         return self._probed(found)
 
     def _nominal(self, kind: str, nominal: Element, definition: Element, place: str) -> Facts:
-        axis = inside(nominal, "Axis") if kind in ("cylinder", "cone") else nominal
+        axis = nominal.find("{*}Axis") if kind in ("cylinder", "cone") else nominal
         if axis is None:
             raise NotUnderstoodError("has no axis")
-        found: Facts = {
-            "point_mm": self.units.place(inside(axis, "Location" if axis is nominal else "AxisPoint"), place)
-        }
+        point = axis.find("{*}Location" if axis is nominal else "{*}AxisPoint")
+        found: Facts = {"point_mm": self.units.place(point, place)}
         if kind != "sphere":
             key = "Normal" if kind in ("plane", "circle", "point") else "Direction"
             found["direction"] = _direction(axis, key, place)
         if kind == "line":
             found["normal"] = _direction(nominal, "Normal", place)
         if kind in refused.ROUND:
-            if (diameter := inside(definition, "Diameter")) is None:
+            if (diameter := definition.find("{*}Diameter")) is None:
                 raise NotUnderstoodError("does not say its Diameter")
             found["diameter_mm"], side = self.units.mm(diameter), child(definition, "InternalExternal")
             if side not in ("INTERNAL", "EXTERNAL"):
                 raise NotUnderstoodError("does not say whether it is a hole or a shaft")
             found["inner"] = side == "INTERNAL"
         if kind == "cone":
-            half, whole = inside(definition, "HalfAngle"), inside(definition, "FullAngle")
+            half, whole = definition.find("{*}HalfAngle"), definition.find("{*}FullAngle")
             angle = half if half is not None else whole
             if angle is None:
                 raise NotUnderstoodError("does not say its angle")
@@ -202,10 +201,12 @@ class _Document:
         kind = found["kind"]
         if kind not in ("line", "cylinder", "cone"):
             return
-        length = inside(nominal if kind == "line" else definition, "LargeEndDistance" if kind == "cone" else "Length")
+        length = (nominal if kind == "line" else definition).find(
+            "{*}LargeEndDistance" if kind == "cone" else "{*}Length"
+        )
         start, slope = 0.0, math.tan(math.radians(found["angle_deg"] / 2)) if kind == "cone" else 0.0
         if slope and length is not None:
-            small = inside(definition, "SmallEndDistance")
+            small = definition.find("{*}SmallEndDistance")
             start = self.units.mm(small) if small is not None else -0.5 * found["diameter_mm"] / slope
         if length is None:
             self.drawing.open_keys[found["name"]] = ["length_mm", "point_mm"]
@@ -244,7 +245,7 @@ class _Document:
         if (condition := child(definition, "MaterialCondition")) not in _PLAIN:
             raise NotUnderstoodError(f"holds at {condition.lower()} material condition, which is not modelled")
         usual = "DiametricalZone" if kinds[:1] and kinds[0] in ("circle", "cylinder", "cone", "line") else "PlanarZone"
-        zone = inside(definition, "ZoneShape")
+        zone = definition.find("{*}ZoneShape")
         shape = "" if zone is None or not len(zone) else local(zone[0])
         if shape and shape not in (("DiametricalZone", "SphericalZone") if what == "position" else (usual,)):
             raise NotUnderstoodError(f"has a tolerance zone of shape {shape}, which is not read")
@@ -273,7 +274,7 @@ class _Document:
         return WHATS[sort]
 
     def _features(self, item: Element, what: What) -> list[str]:
-        numbers = listed(inside(item, "FeatureItemIds")) or self._numbers(item)
+        numbers = listed(item.find("{*}FeatureItemIds")) or self._numbers(item)
         if len(numbers) != ASKS[what].features:
             raise NotUnderstoodError(f"is a {what} of {len(numbers) or 'no'} features")
         for number in numbers:
@@ -285,18 +286,18 @@ class _Document:
 
     def _limits(self, what: What, nominal: Element, definition: Element) -> Facts:
         if ASKS[what].limits == "zone":
-            width = inside(definition, "ToleranceValue")
+            width = definition.find("{*}ToleranceValue")
             if width is None or self.units.mm(width, pmi=True) <= 0:
                 raise NotUnderstoodError("has no tolerance above 0")
             return {"tolerance_mm": self.units.mm(width, pmi=True)}
-        tolerance = inside(definition, "Tolerance")
+        tolerance = definition.find("{*}Tolerance")
         if tolerance is None:
             return {}
         value = self.units.degrees if ASKS[what].limits == "angles" else self.units.mm
-        low, high = inside(tolerance, "MinValue"), inside(tolerance, "MaxValue")
+        low, high = tolerance.find("{*}MinValue"), tolerance.find("{*}MaxValue")
         if low is None or high is None:
             raise NotUnderstoodError("has a tolerance without two limits, which is not read")
-        target, about = inside(nominal, "TargetValue"), 0.0
+        target, about = nominal.find("{*}TargetValue"), 0.0
         if child(tolerance, "DefinedAsLimit") != "true":
             if target is None:
                 raise NotUnderstoodError("has limits about a value that is not there")
@@ -309,23 +310,23 @@ class _Document:
         found = []
         order = {word: i for i, word in enumerate(("PRIMARY", "SECONDARY", "TERTIARY"))}
         datums = [each for each in listed if local(each) == "Datum"]
-        for datum in sorted(datums, key=lambda one: order.get(whole_text(inside(one, "Precedence")), len(order))):
-            common = inside(datum, "CompoundDatum")
+        for datum in sorted(datums, key=lambda one: order.get(whole_text(one.find("{*}Precedence")), len(order))):
+            common = datum.find("{*}CompoundDatum")
             parts = [datum] if common is None else [each for each in common if local(each) == "Datum"]
             found.append(BETWEEN.join(map(self._datum, parts)))
         return found
 
     def _datum(self, datum: Element) -> str:
-        simple = inside(datum, "SimpleDatum")
+        simple = datum.find("{*}SimpleDatum")
         if simple is None:
             raise NotUnderstoodError("has a datum of a kind that is not read")
         if (condition := child(simple, "MaterialModifier")) not in _PLAIN:
             raise NotUnderstoodError(f"has a datum at {condition.lower()} material condition, which is not modelled")
         definition = self._referred(simple, "DatumDefinitionId")
         label = child(definition, "DatumLabel")
-        if inside(definition, "DatumTargetIds") is not None:
+        if definition.find("{*}DatumTargetIds") is not None:
             raise NotUnderstoodError(f"is about the datum {label} on datum targets, which are not read")
-        named = listed(inside(definition, "FeatureNominalIds"))
+        named = listed(definition.find("{*}FeatureNominalIds"))
         if named and all(number in self.of_nominal for number in named):
             return BETWEEN.join(self.of_nominal[number] for number in named)
         pattern = re.compile(rf"(datum[ _-]?)?{re.escape(label)}", re.IGNORECASE)

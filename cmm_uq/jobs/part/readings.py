@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.base.files.csv_table import GIVE, Cells, cells_of, numbers
+from cmm_uq.base.files.csv_table import GIVE, CsvTable, cells_of, numbers
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.tables import CalibratedPartFacts, OrientationsFacts, PartFile, Places
@@ -23,41 +23,16 @@ _FAR = 0.01  # share of a standard's size beyond which a reading is of another o
 ReadFile = Callable[[str], tuple[bytes, str]]  # bytes of a file that the job names, and its name in messages
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """A table as it was recorded, and its name in messages."""
-
-    cells: Cells
-    where: str
+class Recording(CsvTable):
+    """A table as it was recorded."""
 
     @classmethod
-    def of(cls, content: bytes, where: str) -> Recording:
-        cells = cells_of(content, where, "Save it as CSV in UTF-8, with commas between the columns")
-        short = next((i for i, row in enumerate(cells.rows) if len(row) != len(cells.header)), None)
-        if short is not None:
-            raise CmmUqError(f"has {len(cells.rows[short])} cells, and the header {len(cells.header)}",
-                             where=f"{where} line {cells.lines[short]}", fix="Complete the row")  # fmt: skip
-        return cls(cells, where)
-
-    @classmethod
-    def of_repeats(cls, content: bytes, where: str) -> Recording:
-        found = cls.of(content, where)
-        if not found.cells.rows:
+    def of(cls, content: bytes, where: str, *, empty: bool = False) -> Recording:
+        table = cls(**vars(cells_of(content, where, "Save it as CSV in UTF-8, with commas between the columns")))
+        table.refuse_uneven()
+        if not table.rows and not empty:
             raise CmmUqError("has no rows", where=where, fix="Record the measurements")
-        return found
-
-    def at(self, row: int) -> str:
-        return f"{self.where} line {self.cells.lines[row]}"
-
-    def texts(self, name: str) -> list[str]:
-        if name not in self.cells.header:
-            fix = f"Give it; there are {', '.join(self.cells.header)}"
-            raise CmmUqError(f"has no column {name!r}", where=self.where, fix=fix)
-        place = self.cells.header.index(name)
-        return [row[place] for row in self.cells.rows]
-
-    def numbers(self, name: str, fix: str = GIVE) -> Floats:
-        return numbers(self.texts(name), lambda row: f"{self.at(row)}, column {name}", fix)
+        return table
 
     def points(self, fix: str = GIVE) -> Floats:
         """(n, 4) number of each point, and its coordinates."""
@@ -65,26 +40,21 @@ class Recording:
 
     def keys(self, group: str) -> list[tuple[int, int]]:
         """Numbers of cycle or orientation and of repeat of each row; one repeat where there is no such column."""
-        of = self._whole(group)
-        repeat = self._whole("repeat") if "repeat" in self.cells.header else [1] * len(of)
-        return list(zip(of, repeat, strict=True))
-
-    def _whole(self, name: str) -> list[int]:
-        found = self.numbers(name).tolist()
-        for row, value in enumerate(found):
-            if value != int(value) or not 0 <= value <= _LARGEST:
-                where = f"{self.at(row)}, column {name}"
-                raise CmmUqError(f"{value:g} is no number of a {name}", where=where, fix="Count from 1")
-        return [int(value) for value in found]
+        found = {"repeat": [1.0] * len(self.rows)}
+        for name in (group, *({"repeat"} & {*self.header})):
+            found[name] = self.numbers(name).tolist()
+            for row, value in enumerate(found[name]):
+                if value != int(value) or not 0 <= value <= _LARGEST:
+                    said = f"{value:g} is no number of a {name}"
+                    raise CmmUqError(said, where=self.at(row, name), fix="Count from 1")
+        return [(int(of), int(repeat)) for of, repeat in zip(found[group], found["repeat"], strict=True)]
 
 
 def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> Floats:
     """(n, 3) measured points in the order of the plan's, mm."""
-    table = Recording.of(content, where)
+    table = Recording.of(content, where, empty=True)
     for name in COLUMNS:
-        if name not in table.cells.header:
-            fix = f"Its columns are {', '.join(COLUMNS)}, with commas between them"
-            raise CmmUqError(f"has no column {name!r}", where=where, fix=fix)
+        table.texts(name, f"Its columns are {', '.join(COLUMNS)}, with commas between them")
     number = table.points("Give a number: every point of the plan is needed")
     return _in_order(table, list(range(len(number))), number, where, features)
 
@@ -95,21 +65,20 @@ def _in_order(table: Recording, some: Sequence[int], number: Floats, where: str,
     rows: dict[tuple[str, int], int] = {}
     wrong = Gathered()
     for row in some:
-        name, index, at = names[row], float(number[row, 0]), f"{where} line {table.cells.lines[row]}"
+        name, index, at = names[row], float(number[row, 0]), f"{where} line {table.lines[row]}"
         count = len(known[name].points) if name in known else 0
         if name not in known:
-            wrong.add(CmmUqError(f"there is no feature {name!r}", where=at, fix=suggestion(name, known)))
+            wrong.tell(f"there is no feature {name!r}", where=at, fix=suggestion(name, known))
         elif index != int(index) or not 1 <= index <= count:
-            wrong.add(CmmUqError(f"{name!r} has no point {index:g}", where=at, fix=f"It has 1 to {count} by its plan"))
+            wrong.tell(f"{name!r} has no point {index:g}", where=at, fix=f"It has 1 to {count} by its plan")
         elif (name, int(index)) in rows:
-            said = f"point {index:g} of {name!r} stands there twice"
-            wrong.add(CmmUqError(said, where=at, fix="Leave one of them out"))
+            wrong.tell(f"point {index:g} of {name!r} stands there twice", where=at, fix="Leave one of them out")
         else:
             rows[name, int(index)] = row
             away = float(np.linalg.norm(number[row, 1:] - known[name].points[int(index) - 1]))
             if away > FAR_MM:
-                wrong.add(CmmUqError(f"point {index:g} of {name!r} lies {away:.4g} mm from where it is planned", where=at,
-                                     fix="Give it in mm in the frame of the part, in the order of the plan"))  # fmt: skip
+                said = f"point {index:g} of {name!r} lies {away:.4g} mm from where it is planned"
+                wrong.tell(said, where=at, fix="Give it in mm in the frame of the part, in the order of the plan")
     if wrong.problems and rows:
         planned = np.array([known[name].points[index - 1] for name, index in rows])
         _refuse_another_unit(planned, number[list(rows.values()), 1:], where)
@@ -132,8 +101,8 @@ def _refuse_another_unit(planned: Floats, found: Floats, where: str) -> None:
     factor = float(np.sum(found * planned)) / (float(np.sum(planned**2)) or 1.0)
     unit = in_another_unit(factor)
     if unit and np.linalg.norm(found / factor - planned, axis=1).max() <= FAR_MM:
-        raise CmmUqError(f"the points are {factor:.4g} times those of the plan, as if they were {unit}", where=where,
-                         fix="Give them in mm in the frame of the part")  # fmt: skip
+        said = f"the points are {factor:.4g} times those of the plan, as if they were {unit}"
+        raise CmmUqError(said, where=where, fix="Give them in mm in the frame of the part")
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,15 +162,12 @@ def _check_calibrated(one: CalibratedPartFacts, facts: PartFile, where: str, wro
     names = [each.name for each in one.characteristic]
     for i, each in enumerate(one.characteristic):
         if each.name not in asked:
-            problem, fix = f"there is no characteristic {each.name!r}", suggestion(each.name, asked)
+            wrong.tell(f"there is no characteristic {each.name!r}", where=where, fix=suggestion(each.name, asked))
         elif each.name in names[:i]:
-            problem, fix = f"{each.name!r} stands there twice", "Give each characteristic once"
+            wrong.tell(f"{each.name!r} stands there twice", where=where, fix="Give each characteristic once")
         elif each.angle != (asked[each.name].asks.limits == "angles"):
-            unit = "value_deg and u_arcsec" if not each.angle else "value_mm and u_um"
-            problem, fix = f"{each.name!r} is stated in the wrong unit", f"Give {unit}"
-        else:
-            continue
-        wrong.add(CmmUqError(problem, where=where, fix=fix))
+            fix = f"Give {'value_deg and u_arcsec' if not each.angle else 'value_mm and u_um'}"
+            wrong.tell(f"{each.name!r} is stated in the wrong unit", where=where, fix=fix)
 
 
 def _check_tips(one: OrientationsFacts, facts: PartFile, where: str, wrong: Gathered) -> None:
@@ -209,16 +175,14 @@ def _check_tips(one: OrientationsFacts, facts: PartFile, where: str, wrong: Gath
     for probe in one.probe_standard:
         name = probe.stylus or styli[0]
         if not probe.stylus and len(styli) > 1:
-            problem = f"there are {len(styli)} styli, and a probe_standard does not say which measured it"
-            fix = f"Give stylus = {styli[0]!r} or another"
+            said = f"there are {len(styli)} styli, and a probe_standard does not say which measured it"
+            wrong.tell(said, where=where, fix=f"Give stylus = {styli[0]!r} or another")
         elif name not in styli:
-            problem, fix = f"there is no stylus {name!r}", suggestion(name, styli)
+            wrong.tell(f"there is no stylus {name!r}", where=where, fix=suggestion(name, styli))
         elif name in seen:
-            problem, fix = f"the stylus {name!r} has two standards", "Give it one"
+            wrong.tell(f"the stylus {name!r} has two standards", where=where, fix="Give it one")
         else:
             seen.add(name)
-            continue
-        wrong.add(CmmUqError(problem, where=where, fix=fix))
 
 
 def _repeats(
@@ -228,12 +192,11 @@ def _repeats(
 
     ``needed``: characteristics whose values must be there; ``None`` takes those that are.
     """
-    table = Recording.of_repeats(content, where)
-    by_points = "feature" in table.cells.header
-    if not by_points and "characteristic" not in table.cells.header:
-        raise CmmUqError("has neither a column 'characteristic' nor 'feature'", where=where,
-                         fix=f"Its columns are {group}, repeat, characteristic, value_mm, or {group}, repeat, "
-                             f"{', '.join(COLUMNS)}")  # fmt: skip
+    table = Recording.of(content, where)
+    by_points = "feature" in table.header
+    if not by_points and "characteristic" not in table.header:
+        fix = f"Its columns are {group}, repeat, characteristic, value_mm, or {group}, repeat, {', '.join(COLUMNS)}"
+        raise CmmUqError("has neither a column 'characteristic' nor 'feature'", where=where, fix=fix)
     keys = table.keys(group)
     measured = sorted(set(keys))
     number = np.array([key[0] for key in measured], dtype=np.int64)
@@ -255,12 +218,10 @@ def _values(
     wrong = Gathered()
     for row, (name, key) in enumerate(zip(table.texts("characteristic"), keys, strict=True)):
         if name not in asked:
-            wrong.add(
-                CmmUqError(f"there is no characteristic {name!r}", where=table.at(row), fix=suggestion(name, asked))
-            )
+            wrong.tell(f"there is no characteristic {name!r}", where=table.at(row), fix=suggestion(name, asked))
         elif key in found.setdefault(name, {}):
             told = f"{name!r} stands there twice for {group} {key[0]}, repeat {key[1]}"
-            wrong.add(CmmUqError(told, where=table.at(row), fix="Number the repeats, or leave one of them out"))
+            wrong.tell(told, where=table.at(row), fix="Number the repeats, or leave one of them out")
         else:
             with wrong.going_on():
                 found[name][key] = _value(table, row, angle=asked[name].asks.limits == "angles")
@@ -270,36 +231,33 @@ def _values(
         if lacking := [key for key in measured if key not in found.get(name, {})]:
             said = f"{name!r} has no value for {group} {lacking[0][0]}, repeat {lacking[0][1]}"
             raise CmmUqError(said, where=table.where, fix="Give it for each measurement")
-    return {
-        name: np.array([found[name][key] for key in measured])
-        for name in asked
-        if len(found.get(name, {})) == len(measured)
-    }
+    whole = (name for name in asked if len(found.get(name, {})) == len(measured))
+    return {name: np.array([found[name][key] for key in measured]) for name in whole}
 
 
 def _value(table: Recording, row: int, *, angle: bool) -> float:
     """A value of a row, mm or rad."""
-    column, header = _VALUES[angle], table.cells.header
-    if column not in header:
+    column = _VALUES[angle]
+    if column not in table.header:
         fix = f"Give {'angles' if angle else 'lengths'} in it"
         raise CmmUqError(f"has no column {column!r}", where=table.where, fix=fix)
-    value = float(
-        numbers([table.cells.rows[row][header.index(column)]], lambda _: f"{table.at(row)}, column {column}")[0]
-    )
+    text = table.rows[row][table.header.index(column)]
+    value = float(numbers([text], lambda _: table.at(row, column))[0])
     return float(np.radians(value)) if angle else value
 
 
 def _standard(content: bytes, where: str, column: str, calibrated: float) -> StandardReadings:
-    table = Recording.of_repeats(content, where)
+    table = Recording.of(content, where)
     keys, values = table.keys("orientation"), table.numbers(column)
-    first, wrong = {key: row for row, key in reversed(list(enumerate(keys)))}, Gathered()
+    seen, wrong = set[tuple[int, int]](), Gathered()
     for row, (key, value) in enumerate(zip(keys, values.tolist(), strict=True)):
-        if first[key] != row:
+        if key in seen:
             said = f"orientation {key[0]}, repeat {key[1]} stands there twice"
-            wrong.add(CmmUqError(said, where=table.at(row), fix="Number the repeats"))
+            wrong.tell(said, where=table.at(row), fix="Number the repeats")
+        seen.add(key)
         if abs(value - calibrated) > _FAR * calibrated:
             said = f"{value:g} mm is not the standard of {calibrated:g} mm"
-            wrong.add(CmmUqError(said, where=table.at(row), fix="Give it in mm, as the machine read it"))
+            wrong.tell(said, where=table.at(row), fix="Give it in mm, as the machine read it")
     wrong.refuse()
     found = StandardReadings(values, np.array([key[0] for key in keys], dtype=np.int64))
     _refuse_unequal(found, where)

@@ -8,6 +8,7 @@ lower_tol_mm and upper_tol_mm for two limits. Nothing is passed over: a column t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, get_args
 
 from cmm_uq.base.errors import CmmUqError, suggestion
@@ -19,22 +20,12 @@ from cmm_uq.jobs.part.feature import CharacteristicFacts, FeatureFacts, Kind, St
 
 PROGRAM = "table"
 NAMES = "feature", "kind", "characteristic", "what"
-_PLACE, _DIRECTION, _TOLERANCES = (
-    ("x_mm", "y_mm", "z_mm"),
-    ("i", "j", "k"),
-    ("nominal_mm", "lower_tol_mm", "upper_tol_mm"),
-)
+_PLACE, _DIRECTION = ("x_mm", "y_mm", "z_mm"), ("i", "j", "k")
+_TOLERANCES = ("nominal_mm", "lower_tol_mm", "upper_tol_mm")
 _OF_STRATEGY = tuple(Strategy.model_fields)
 _VECTORS = "along", "normal"
-_OF_FEATURE = {*FeatureFacts.model_fields} - {
-    "name",
-    "point_mm",
-    "direction",
-    "strategy",
-    "points_mm",
-    "form",
-    "reported_as",
-}
+_ELSEWHERE = {"name", "point_mm", "direction", "strategy", "points_mm", "form", "reported_as"}
+_OF_FEATURE = {*FeatureFacts.model_fields} - _ELSEWHERE
 _OF_CHARACTERISTIC = {*CharacteristicFacts.model_fields} - {"name", "features", "reported_as"}
 _TEXTS = {*NAMES, *_VECTORS, "datums", "stylus", "association", "pattern", "inner"}
 _OWN = (*NAMES, *_PLACE, *_DIRECTION, *_TOLERANCES)
@@ -53,15 +44,11 @@ def drawing_of_table(content: bytes, where: str) -> Drawing:
         It is no table with a column ``feature``, a column or a cell is not understood, or a feature stands twice.
     """
     for sheet in format_of(content, where).read(content, where, ImportKeys()):
-        head = next((i for i, row in enumerate(sheet.rows) if _name(row) == NAMES[0]), None)
-        if head is not None:
-            return _drawing(sheet, head, where)
+        for head, row in enumerate(sheet.rows):
+            if row and str(row[0]).strip().lower() == NAMES[0]:
+                return _drawing(sheet, head, where)
     fix = f"Give it a row of headings that begins with feature: {', '.join(COLUMNS[:12])}, …; or export QIF or DMIS"
     raise CmmUqError("is neither a QIF plan, nor a DMIS program, nor a table of features", where=where, fix=fix)
-
-
-def _name(row: Sequence[Cell]) -> str:
-    return str(row[0]).strip().lower() if row else ""
 
 
 def _drawing(sheet: Sheet, head: int, where: str) -> Drawing:
@@ -73,38 +60,31 @@ def _drawing(sheet: Sheet, head: int, where: str) -> Drawing:
     drawing, defined = Drawing(PROGRAM), set[str]()
     for i, facts in _rows(sheet, head, headings, where):
         name, kind, what = (str(facts.pop(key, "")) for key in ("feature", "kind", "what"))
-        number = str(facts.pop("characteristic", "")) or str(len(drawing.characteristics) + 1)
+        number, at = str(facts.pop("characteristic", "")) or str(len(drawing.characteristics) + 1), sheet.at(where, i)
         if not name or not (kind or what):
             problem = "names no feature" if not name else f"says of {name!r} neither its kind nor what is asked of it"
-            raise CmmUqError(problem, where=sheet.at(where, i), fix="Fill in feature, and kind or what")
+            raise CmmUqError(problem, where=at, fix="Fill in feature, and kind or what")
         if kind:
             if name in defined:
-                raise CmmUqError(
-                    f"describes {name!r} again", where=sheet.at(where, i), fix="Leave kind empty in this row"
-                )
+                raise CmmUqError(f"describes {name!r} again", where=at, fix="Leave kind empty in this row")
             defined.add(name)
             drawing.features.append(_feature(name, kind, facts, drawing))
         if what:
-            drawing.characteristics.append(_characteristic(number, what, name, facts, sheet.at(where, i)))
+            drawing.characteristics.append(_characteristic(number, what, name, facts, at))
         if facts:
-            problem = (
-                f"{next(iter(facts))} belongs to {'a feature' if not kind else 'a characteristic'}, and the row is none"
-            )
-            raise CmmUqError(
-                problem, where=sheet.at(where, i), fix=f"Fill in {'kind' if not kind else 'what'}, or empty it"
-            )
+            of, key = ("characteristic", "what") if kind else ("feature", "kind")
+            problem = f"{next(iter(facts))} belongs to a {of}, and the row is none"
+            raise CmmUqError(problem, where=at, fix=f"Fill in {key}, or empty it")
     return drawing
 
 
 def _rows(sheet: Sheet, head: int, headings: Sequence[str], where: str) -> list[tuple[int, Facts]]:
     """What each row with something in it says, by heading; numbers with one decimal sign."""
     rows = [i for i in range(head + 1, len(sheet.rows)) if any(cell != "" for cell in sheet.rows[i])]
-    cells = {
-        heading: [
-            (i, sheet.rows[i][column]) for i in rows if column < len(sheet.rows[i]) and sheet.rows[i][column] != ""
-        ]
-        for column, heading in enumerate(headings)
-    }
+    cells: dict[str, list[tuple[int, Cell]]] = {}
+    for k, heading in enumerate(headings):
+        there = [i for i in rows if k < len(sheet.rows[i]) and sheet.rows[i][k] != ""]
+        cells[heading] = [(i, sheet.rows[i][k]) for i in there]
     figures = [heading for heading in headings if heading not in _TEXTS]
 
     def at(column: int, row: int) -> str:
@@ -116,8 +96,8 @@ def _rows(sheet: Sheet, head: int, headings: Sequence[str], where: str) -> list[
         if heading in _TEXTS:
             values: Sequence[Any] = [_text(heading, cell, sheet.at(where, i)) for i, cell in column]
         else:
-            each = figures.index(heading)
-            values = values_of([cell for _, cell in column], sign, lambda row, each=each: at(each, row)).tolist()  # type: ignore[misc]
+            each = partial(at, figures.index(heading))
+            values = values_of([cell for _, cell in column], sign, each).tolist()
         for (i, _), value in zip(column, values, strict=True):
             found[i][heading] = int(value) if heading in _WHOLE and value == int(value) else value
     return list(found.items())
@@ -137,17 +117,12 @@ def _text(heading: str, cell: Cell, where: str) -> str | bool | list[str] | list
     return [one.strip() for one in text.split("|")] if heading == "datums" else text
 
 
-def _taken(facts: Facts, keys: Sequence[str]) -> list[Any]:
-    return [facts.pop(key) for key in keys if key in facts]
-
-
 def _feature(name: str, kind: str, facts: Facts, drawing: Drawing) -> Facts:
     made: Facts = {"name": name, "kind": kind}
     for key, columns in (("point_mm", _PLACE), ("direction", _DIRECTION)):
-        if values := _taken(facts, columns):
+        if values := [facts.pop(column) for column in columns if column in facts]:
             made[key] = values
-    strategy = {key: facts.pop(key) for key in _OF_STRATEGY if key in facts}
-    if strategy:
+    if strategy := {key: facts.pop(key) for key in _OF_STRATEGY if key in facts}:
         made["strategy"] = {"pattern": "points", **strategy}
     elif kind != "point":
         made["strategy"] = usual_strategy(kind) if kind in get_args(Kind) else {"pattern": "points", "points": 1}
@@ -160,8 +135,7 @@ def _characteristic(number: str, what: str, feature: str, facts: Facts, where: s
     if "nominal_mm" in facts or "upper_tol_mm" in facts:
         nominal, below, above = (facts.pop(key, None) for key in _TOLERANCES)
         if nominal is None or below is None or above is None or {"lower_mm", "upper_mm"} & facts.keys():
-            raise CmmUqError(
-                "has a nominal value without both tolerances, or limits beside it", where=where, fix=_LIMITS
-            )
+            said = "has a nominal value without both tolerances, or limits beside it"
+            raise CmmUqError(said, where=where, fix=_LIMITS)
         made |= limits(what, nominal + below, nominal + above)
     return made | {key: facts.pop(key) for key in sorted(_OF_CHARACTERISTIC & facts.keys())}

@@ -24,7 +24,7 @@ from cmm_uq.jobs.importing.encodings import begins_with, decoded, local, report_
 from cmm_uq.jobs.importing.format import HEAD, length_named
 from cmm_uq.jobs.importing.pcdmis import Dimension, PcDmis, dimensions, figure_of, step_of
 from cmm_uq.jobs.importing.reports import ACTUAL, DMIS_UNIT, Dmis, one_unit, statements
-from cmm_uq.jobs.part.drawing import NotUnderstoodError, QifUnits, inside, text, whole_text
+from cmm_uq.jobs.part.drawing import NotUnderstoodError, QifUnits, text, whole_text
 from cmm_uq.jobs.part.qif import ASSOCIATIONS, WHATS
 from cmm_uq.jobs.part.readings import Recording
 from cmm_uq.jobs.part.tables import PartFile, Places
@@ -85,67 +85,50 @@ class _Contents:
 def reported_values(content: bytes, where: str, file: str, facts: PartFile, places: Places) -> Reported:
     """What the report says of the job; names that lead nowhere are refused, and a report that says nothing of it."""
     contents, wrong = _read(content, where), Gathered()
-    angles = {one.name: one.asks.limits == "angles" for one in facts.characteristic}
     values, features = dict[str, ReportedValue](), dict[str, ReportedFeature]()
     for i, one in enumerate(facts.characteristic):
-        at = places.of("characteristic", "reported_as", i)
+        at = places.of("characteristic", "reported_as", i) if one.reported_as else ""
         name = one.reported_as or one.name
         if len(contents.values.get(name, ())) > 1:  # of several kinds, as the diameter and the position of one call-out
             kinds = [f"{name}.{sort}" for sort, what in WHATS.items() if what == one.what]
             name = next((kind for kind in kinds if kind in contents.values), name)
-        for found in _asked(name, contents.values, "value", at if one.reported_as else "", where, wrong):
+        for found in _asked(name, contents.values, "value", at, where, wrong):
             values[one.name] = found
-            if found.angle != angles[one.name]:
-                said = "an angle" if found.angle else "a length"
-                wrong.add(
-                    CmmUqError(
-                        f"{one.reported_as or one.name!r} is {said}, and the job asks for {one.what}",
-                        where=found.where,
-                        fix="Name another value by reported_as",
-                    )
-                )
+            if found.angle != (one.asks.limits == "angles"):
+                sort = "an angle" if found.angle else "a length"
+                said = f"{one.reported_as or one.name!r} is {sort}, and the job asks for {one.what}"
+                wrong.tell(said, where=found.where, fix="Name another value by reported_as")
     for i, feature in enumerate(facts.feature):
-        at = places.of("feature", "reported_as", i)
+        at = places.of("feature", "reported_as", i) if feature.reported_as else ""
         name = feature.reported_as or feature.name
-        for known in _asked(name, contents.features, "feature", at if feature.reported_as else "", where, wrong):
+        for known in _asked(name, contents.features, "feature", at, where, wrong):
             features[feature.name] = known
             if known.association and known.association != feature.association:
                 said = f"{feature.name!r} was associated by {known.association}, and by the job it is by {feature.association}"
                 fix = f"Give association = {known.association!r}, or have it evaluated as the drawing says"
-                wrong.add(CmmUqError(said, where=known.where, fix=fix))
-    if contents.only_known:
-        _refuse_strange(contents, facts, where, wrong)
+                wrong.tell(said, where=known.where, fix=fix)
+    every = [*contents.values, *contents.features]
+    own = [one.reported_as or one.name for one in facts.characteristic]
+    own += [one.reported_as or one.name for one in facts.feature]
+    for name in [name for name in every if contents.only_known and name not in own]:
+        said = f"there is no characteristic or feature {name!r} in the job"
+        wrong.tell(said, where=where, fix=suggestion(name, own))
     wrong.refuse()
     if not values and not features:
-        known_names = ", ".join([*contents.values, *contents.features][:12]) or "nothing"
-        raise CmmUqError(
-            f"has none of the job's characteristics or features; it has {known_names}",
-            where=where,
-            fix='Name them in the job: reported_as = "…"',
-        )
+        said = f"has none of the job's characteristics or features; it has {', '.join(every[:12]) or 'nothing'}"
+        raise CmmUqError(said, where=where, fix='Name them in the job: reported_as = "…"')
     whole = Reported(file, contents.program, values, features)
     return whole if contents.padded else _printed_alike(whole)
 
 
 def _printed_alike(given: Reported) -> Reported:
     """With the step of the finest length, and angle, for all: zeros at the end are left out."""
-    lengths = [one.step for one in given.values.values() if not one.angle]
-    lengths += [one.step for one in given.features.values()]
-    length = min(lengths, default=math.inf)
-    angle = min((one.step for one in given.values.values() if one.angle), default=math.inf)
-    values = {name: replace(one, step=angle if one.angle else length) for name, one in given.values.items()}
-    return replace(
-        given, values=values, features={name: replace(one, step=length) for name, one in given.features.items()}
-    )
-
-
-def _refuse_strange(contents: _Contents, facts: PartFile, where: str, wrong: Gathered) -> None:
-    own = [one.reported_as or one.name for one in facts.characteristic]
-    own += [one.reported_as or one.name for one in facts.feature]
-    for name in (*contents.values, *contents.features):
-        if name not in own:
-            said = f"there is no characteristic or feature {name!r} in the job"
-            wrong.add(CmmUqError(said, where=where, fix=suggestion(name, own)))
+    steps = {angle: [one.step for one in given.values.values() if one.angle == angle] for angle in (False, True)}
+    steps[False] += [one.step for one in given.features.values()]
+    finest = {angle: min(own, default=math.inf) for angle, own in steps.items()}
+    values = {name: replace(one, step=finest[one.angle]) for name, one in given.values.items()}
+    features = {name: replace(one, step=finest[False]) for name, one in given.features.items()}
+    return replace(given, values=values, features=features)
 
 
 def _asked(
@@ -154,10 +137,10 @@ def _asked(
     """What the report holds by a name, nothing or one; wrong is anything else, and nothing by what is named ``at`` a key."""
     found = held.get(name, ())
     if at and not found:
-        wrong.add(CmmUqError(f"{where} has no {what} {name!r}", where=at, fix=suggestion(name, held)))
+        wrong.tell(f"{where} has no {what} {name!r}", where=at, fix=suggestion(name, held))
     if len(found) > 1:
         said = f"has {len(found)} {what}s {name!r}, and which of them is of this part is not known"
-        wrong.add(CmmUqError(said, where=where, fix="Give the report of one part, or name another by reported_as"))
+        wrong.tell(said, where=where, fix="Give the report of one part, or name another by reported_as")
     if len(found) == 1:
         with wrong.going_on():
             return [found[0]()]
@@ -191,13 +174,9 @@ def _value(written: str, factor: float, where: str, *, angle: bool = False) -> R
 
 
 def _feature(
-    where: str,
-    factor: float,
-    point: Sequence[str] = (),
-    direction: Sequence[str] = (),
-    diameter: str = "",
+    where: str, factor: float, point: Sequence[str] = (), direction: Sequence[str] = (), diameter: str = "",
     association: str = "",
-) -> ReportedFeature:
+) -> ReportedFeature:  # fmt: skip
     """Of what is written; ``factor``: mm of its unit."""
     lengths = [*point, *([diameter] if diameter else [])]
     numbers = [factor * _number(each, where) for each in lengths]
@@ -206,23 +185,17 @@ def _feature(
     if len(along) and not length:
         raise CmmUqError("has a direction of no length", where=where, fix="Export the report again")
     return ReportedFeature(
-        where,
-        min((factor * step_of(each) for each in lengths), default=math.inf),
-        np.array(numbers[:3]) if point else None,
-        along / length if length else None,
-        numbers[-1] if diameter else None,
+        where, min((factor * step_of(each) for each in lengths), default=math.inf),
+        np.array(numbers[:3]) if point else None, along / length if length else None, numbers[-1] if diameter else None,
         association,
-    )
+    )  # fmt: skip
 
 
 def _millimetres(unit: str, where: str) -> float:
     found = length_named(unit)
     if found is None:
-        raise CmmUqError(
-            f"the unit {unit!r} is no length" if unit else "does not say its unit of length",
-            where=where,
-            fix="Export the report with its unit, as mm or inch",
-        )
+        problem = f"the unit {unit!r} is no length" if unit else "does not say its unit of length"
+        raise CmmUqError(problem, where=where, fix="Export the report with its unit, as mm or inch")
     return float(found.up / found.down)
 
 
@@ -245,15 +218,12 @@ def _of_pcdmis(lines: Sequence[str], where: str) -> _Contents:
 
 def _row(one: Dimension, axis: str) -> ReportedValue:
     written, where = one.measured(axis), one.rows[axis][2]
-    if axis == "A":
-        return _value(written, 1.0, where, angle=True)
-    if one.at_material_condition(axis):
-        raise CmmUqError(
-            f"{one.name}.{axis} holds at a material condition, which is not modelled",
-            where=where,
-            fix="Have it evaluated regardless of size (RFS), or leave the characteristic out",
-        )
-    return _value(written, _millimetres(one.unit, where) * (2 if axis == "R" else 1), where)
+    if axis != "A" and one.at_material_condition(axis):
+        said = f"{one.name}.{axis} holds at a material condition, which is not modelled"
+        fix = "Have it evaluated regardless of size (RFS), or leave the characteristic out"
+        raise CmmUqError(said, where=where, fix=fix)
+    factor = 1.0 if axis == "A" else _millimetres(one.unit, where) * (2 if axis == "R" else 1)
+    return _value(written, factor, where, angle=axis == "A")
 
 
 def _location(one: Dimension) -> ReportedFeature:
@@ -280,11 +250,8 @@ def _of_dmis(lines: Sequence[str], where: str) -> _Contents:
 def _actual(sort: str, words: Sequence[str], unit: str, where: str) -> ReportedFeature:
     numbers, needed = [word for word in words if not word[:1].isalpha()], _NUMBERS_DMIS[sort]
     if "CART" not in map(str.upper, words) or len(numbers) < needed:
-        raise CmmUqError(
-            f"is no {sort} in CART with {needed} numbers",
-            where=where,
-            fix="Put it out with CART; if it is the last one, the file was cut off",
-        )
+        fix = "Put it out with CART; if it is the last one, the file was cut off"
+        raise CmmUqError(f"is no {sort} in CART with {needed} numbers", where=where, fix=fix)
     direction, diameter = numbers[3:6] if needed >= 6 else (), numbers[needed - 1] if needed in (4, 7) else ""
     return _feature(where, _millimetres(unit, where), numbers[:3], direction, diameter)
 
@@ -296,36 +263,37 @@ def _of_qif(content: bytes, where: str) -> _Contents:
     by_id = {element.get("id", ""): element for element in root.iter() if element.get("id")}
     designated: dict[str, list[Callable[[], ReportedValue]]] = {}
     for element in root.iter():
-        tag = local(element)
-        at = f"{where}: {tag} id {element.get('id', '')}"
-        if tag.endswith("CharacteristicMeasurement"):
-            item = by_id.get(child(element, "CharacteristicItemId"))
+        tag, at = local(element), f"{where}: {local(element)} id {element.get('id', '')}"
+        characteristic = tag.endswith("CharacteristicMeasurement")
+        if not characteristic and not tag.endswith("FeatureMeasurement"):
+            continue
+        item = by_id.get(child(element, "CharacteristicItemId" if characteristic else "FeatureItemId"))
+        if item is None:
+            continue
+        if characteristic:
             read = partial(_measured_characteristic, element, units, at, angle=tag.startswith("Angle"))
-            if item is not None:
-                name = child(item, "Name") or f"characteristic {item.get('id', '')}"
-                for key in (name, f"{name}.{tag.removesuffix('CharacteristicMeasurement')}"):
-                    found.values.setdefault(key, []).append(read)
-                if (designator := _within(item, "Designator")) != name:
-                    designated.setdefault(designator, []).append(read)
-        elif tag.endswith("FeatureMeasurement"):
-            item = by_id.get(child(element, "FeatureItemId"))
-            if item is not None:
-                name = child(item, "FeatureName") or f"feature {item.get('id', '')}"
-                nominal = by_id.get(child(item, "FeatureNominalId"))
-                said = None if nominal is None else inside(nominal, "SubstituteFeatureAlgorithm")
-                how = ASSOCIATIONS.get(whole_text(said), "")
-                found.features.setdefault(name, []).append(partial(_measured_feature, element, units, how, at))
+            name = child(item, "Name") or f"characteristic {item.get('id', '')}"
+            for key in (name, f"{name}.{tag.removesuffix('CharacteristicMeasurement')}"):
+                found.values.setdefault(key, []).append(read)
+            if (designator := _within(item, "Designator")) != name:
+                designated.setdefault(designator, []).append(read)
+        else:
+            name = child(item, "FeatureName") or f"feature {item.get('id', '')}"
+            nominal = by_id.get(child(item, "FeatureNominalId"))
+            said = None if nominal is None else nominal.find("{*}SubstituteFeatureAlgorithm")
+            how = ASSOCIATIONS.get(whole_text(said), "")
+            found.features.setdefault(name, []).append(partial(_measured_feature, element, units, how, at))
     found.values.update({name: own for name, own in designated.items() if name and name not in found.values})
     return found
 
 
 def _within(element: Element, name: str) -> str:
     """Text of the first element of this name anywhere in another."""
-    return next((text(inner) for inner in element.iter() if local(inner) == name), "")
+    return (element.findtext(f".//{{*}}{name}") or "").strip()
 
 
 def _measured_characteristic(element: Element, units: QifUnits, where: str, *, angle: bool) -> ReportedValue:
-    inner = inside(element, "Value")
+    inner = element.find("{*}Value")
     if inner is None:
         status = _within(element, "CharacteristicStatusEnum") or "no status"
         raise CmmUqError(f"has no Value ({status})", where=where, fix="Measure it, or leave the characteristic out")
@@ -343,49 +311,35 @@ def _factor(element: Element, units: QifUnits, where: str, *, angle: bool = Fals
 
 
 def _measured_feature(element: Element, units: QifUnits, association: str, where: str) -> ReportedFeature:
-    axis = inside(element, "Axis")
-    of = element if axis is None else axis
-    point = inside(of, "Location" if axis is None else "AxisPoint")
-    direction = child(of, "Direction") or child(of, "Normal")
-    diameter = inside(element, "Diameter")
-    lengths = [each for each in (point, diameter) if each is not None]
-    factors = {_factor(each, units, where) for each in lengths}
+    axis, diameter = element.find("{*}Axis"), element.find("{*}Diameter")
+    of, place = (element, "Location") if axis is None else (axis, "AxisPoint")
+    point, direction = of.find(f"{{*}}{place}"), child(of, "Direction") or child(of, "Normal")
+    factors = {_factor(each, units, where) for each in (point, diameter) if each is not None}
     if len(factors) > 1:
         raise CmmUqError("has its place and its diameter in two units", where=where, fix="Export it in one unit")
     return _feature(
-        where,
-        factors.pop() if factors else 1.0,
-        () if point is None else three(text(point), where),
-        three(direction, where) if direction else (),
-        "" if diameter is None else text(diameter),
-        association,
-    )
+        where, factors.pop() if factors else 1.0, () if point is None else three(text(point), where),
+        three(direction, where) if direction else (), "" if diameter is None else text(diameter), association,
+    )  # fmt: skip
 
 
 def _of_csv(content: bytes, where: str) -> _Contents:
     """Rows of ``characteristic`` with ``value_mm`` or ``value_deg``, or of ``feature`` with its place and diameter."""
-    table, found = Recording.of_repeats(content, where), _Contents(Verbatim("CSV"), only_known=True)
-    header = table.cells.header
+    table, found = Recording.of(content, where), _Contents(Verbatim("CSV"), only_known=True)
+    header = table.header
     strange = [name for name in header if name not in _COLUMNS]
     if strange or not {"characteristic", "feature"} & set(header):
         said = f"has a column {strange[0]!r}" if strange else "has neither a column 'characteristic' nor 'feature'"
         raise CmmUqError(said, where=where, fix=f"Its columns are some of {', '.join(_COLUMNS)}")
-    for row, line in enumerate(table.cells.rows):
-        cells, at = dict(zip(header, line, strict=True)), table.at(row)
-        name, feature = cells.get("characteristic", ""), cells.get("feature", "")
-        length, angle = cells.get("value_mm", ""), cells.get("value_deg", "")
+    for row, line in enumerate(table.rows):
+        cells, at = {**dict.fromkeys(_COLUMNS, ""), **dict(zip(header, line, strict=True))}, table.at(row)
+        name, length, angle, feature, *placed, diameter = (cells[column] for column in _COLUMNS)
         if bool(name) == bool(feature) or bool(length and angle):
-            raise CmmUqError(
-                "is not of one characteristic with value_mm or value_deg, or of one feature",
-                where=at,
-                fix="Give each a row of its own",
-            )
+            said = "is not of one characteristic with value_mm or value_deg, or of one feature"
+            raise CmmUqError(said, where=at, fix="Give each a row of its own")
         if name:
             found.values.setdefault(name, []).append(partial(_value, length or angle, 1.0, at, angle=bool(angle)))
             continue
-        point, along = ([cells.get(key, "") for key in keys] for keys in (_COLUMNS[4:7], _COLUMNS[7:10]))
-        read = partial(
-            _feature, at, 1.0, point if any(point) else (), along if any(along) else (), cells.get("diameter_mm", "")
-        )
-        found.features.setdefault(feature, []).append(read)
+        point, along = (own if any(own) else () for own in (placed[:3], placed[3:]))
+        found.features.setdefault(feature, []).append(partial(_feature, at, 1.0, point, along, diameter))
     return found

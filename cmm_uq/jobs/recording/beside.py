@@ -12,15 +12,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import field_validator, model_validator
+from pydantic import model_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.csv_table import CsvTable, csv_table
-from cmm_uq.base.files.table import AnyFloat, JobTable, Length, Limit, key, required
+from cmm_uq.base.files.table import Expansion, JobTable, Length, Limit, key, required
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.importing.recording import read_recording
@@ -50,7 +50,7 @@ class ShortGaugeFacts(JobTable):
     degrees_of_freedom: Freedom | None = None
     """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them. Figures and
     decisions take u of the normal distribution with the same 95 % interval."""
-    cte_per_k: AnyFloat = key(0.0, "Coefficient of thermal expansion of the gauge, 1/K.")
+    cte_per_k: Expansion = key(0.0, "Coefficient of thermal expansion of the gauge, 1/K.")
     name: str = key("", "Name of the gauge on the certificate.")
     serial: str = key("", "Serial number of the gauge.")
     certificate: Traceability | None = key(None, "The gauge's own certificate.")
@@ -59,13 +59,6 @@ class ShortGaugeFacts(JobTable):
     @classmethod
     def _expanded(cls, data: Any) -> Any:
         return with_standard_uncertainty(data)
-
-    @field_validator("cte_per_k")
-    @classmethod
-    def _an_expansion(cls, cte: float) -> float:
-        if abs(cte) > 1e-3:
-            raise ValueError(f"cte_per_k = {cte:g} is no expansion coefficient: steel has 11.5e-6 per kelvin")
-        return cte
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,52 +92,38 @@ class ShortGauge:
 
 def short_gauge_of(facts: ShortGaugeFacts, content: bytes, where: str, machine: Machine) -> ShortGauge:
     points = read_recording(content, where, machine)
+
+    def refuse(problem: str, row: int, fix: str) -> NoReturn:
+        raise CmmUqError(problem, where=f"{where} line {points.lines[row]}", fix=fix)
+
     for own in points.rows_of_groups:
         if sorted(points.point[own].tolist()) != [1, 2]:
             number, repeat = points.measurement[own[0]], points.repeat[own[0]]
-            raise CmmUqError(f"measurement {number}, repeat {repeat} does not have points 1 and 2 alone",
-                             where=f"{where} line {points.lines[own[0]]}",
-                             fix="Record the middle of either face of the short gauge as points 1 and 2")  # fmt: skip
+            refuse(f"measurement {number}, repeat {repeat} does not have points 1 and 2 alone", own[0],
+                   "Record the middle of either face of the short gauge as points 1 and 2")  # fmt: skip
     ordered = sorted(points.rows_of_groups, key=lambda own: (points.measurement[own[0]], points.repeat[own[0]]))
     gauge = ShortGauge(facts, points, np.array([own[np.argsort(points.point[own])] for own in ordered], dtype=np.int64))
-    errors = gauge.errors_mm
+    errors, first = gauge.errors_mm, gauge.rows[:, 0]
     off = int(np.argmax(np.abs(errors)))
     if abs(errors[off]) > FARTHEST_MM:
-        problem = (
-            f"a length of {errors[off] + facts.length_mm:.5g} mm, where {SHORT_GAUGE} length_mm is {facts.length_mm:g}"
-        )
-        raise CmmUqError(problem, where=f"{where} line {points.lines[gauge.rows[off, 0]]}",
-                         fix="Give the length of the gauge that was recorded, in mm")  # fmt: skip
-    _refuse_another_place(gauge, where)
-    _refuse_one_side(gauge, where)
-    return gauge
-
-
-def _refuse_another_place(gauge: ShortGauge, where: str) -> None:
-    """A measurement is one place: its repeats stand for each other."""
-    points, first = gauge.points, gauge.rows[:, 0]
-    for number in np.unique(points.measurement[first]):
-        own = gauge.rows[points.measurement[first] == number]
-        apart = np.linalg.norm(points.xyz[own] - points.xyz[own[0]], axis=2).max(axis=1)
+        length = errors[off] + facts.length_mm
+        refuse(f"a length of {length:.5g} mm, where {SHORT_GAUGE} length_mm is {facts.length_mm:g}", first[off],
+               "Give the length of the gauge that was recorded, in mm")  # fmt: skip
+    for number in np.unique(points.measurement[first]):  # one place: its repeats stand for each other
+        rows = gauge.rows[points.measurement[first] == number]
+        apart = np.linalg.norm(points.xyz[rows] - points.xyz[rows[0]], axis=2).max(axis=1)
         off = int(np.argmax(apart))
         if apart[off] > FARTHEST_MM:
-            raise CmmUqError(f"measurement {number} has the short gauge in two places, {apart[off]:.3g} mm apart",
-                             where=f"{where} line {points.lines[own[off, 0]]}",
-                             fix="Number each place as a measurement of its own, and its repeats in it")  # fmt: skip
-
-
-def _refuse_one_side(gauge: ShortGauge, where: str) -> None:
-    """Where the senses of travel are recorded they must tell a length that was met from both sides."""
-    columns, points = gauge.points.columns, gauge.points
-    if not all(f"approach_{axis}" in columns for axis in AXES):
-        return
-    approach = np.column_stack([columns[f"approach_{axis}"] for axis in AXES])
-    along = np.einsum("qji,qi->qj", approach[gauge.rows], gauge.lines_mm[1])
-    same = np.flatnonzero(along[:, 0] * along[:, 1] >= 0)
-    if same.size:
-        raise CmmUqError("both faces of the short gauge were reached from the same side",
-                         where=f"{where} line {points.lines[gauge.rows[same[0], 0]]}",
-                         fix="Record a gauge whose faces are met from opposite sides, or mend approach_x, …")  # fmt: skip
+            refuse(f"measurement {number} has the short gauge in two places, {apart[off]:.3g} mm apart", rows[off, 0],
+                   "Number each place as a measurement of its own, and its repeats in it")  # fmt: skip
+    # where the senses of travel are recorded they must tell a length that was met from both sides
+    if all(f"approach_{axis}" in points.columns for axis in AXES):
+        approach = np.column_stack([points.columns[f"approach_{axis}"] for axis in AXES])
+        along = np.einsum("qji,qi->qj", approach[gauge.rows], gauge.lines_mm[1])
+        if (same := np.flatnonzero(along[:, 0] * along[:, 1] >= 0)).size:
+            refuse("both faces of the short gauge were reached from the same side", first[same[0]],
+                   "Record a gauge whose faces are met from opposite sides, or mend approach_x, …")  # fmt: skip
+    return gauge
 
 
 _SENSOR = re.compile(r"(?:temp_)?([xyz])_?(\d+)_c")
@@ -219,12 +198,11 @@ def parse_temperature_log(
     times = _seconds(table, start)
     early = np.flatnonzero(np.diff(times) <= 0)
     if len(early):
-        place = table.at(early[0] + 1)
-        raise CmmUqError("is not later than the line before", where=place, fix="Sort by time, each once")
+        fix = "Sort by time, each once"
+        raise CmmUqError("is not later than the line before", where=table.at(early[0] + 1), fix=fix)
     on_scale = [_columns(table, axis, sensors) for axis in AXES]
     readings = [[_readings(table, row, columns) for columns in on_scale] for row in range(len(times))]
-    scales = np.array([[np.mean(scale) for scale in row] for row in readings])
-    spread = np.array([[np.ptp(scale) for scale in row] for row in readings])
+    scales, spread = (np.array([[of(scale) for scale in row] for row in readings]) for of in (np.mean, np.ptp))
     if max_gap is None:
         max_gap = BRIDGED * float(np.median(np.diff(times))) if len(times) > 1 else np.inf
     return TemperatureLog(times, scales, spread, where, max_gap, dated="time_s" not in table.header)
@@ -269,10 +247,9 @@ def _seconds(table: CsvTable, start: datetime | None) -> Floats:
     for row, moment in enumerate(moments):
         if (moment.tzinfo is None) != (first.tzinfo is None):
             has, other = ("no zone", "has one") if moment.tzinfo is None else ("a zone", "has none")
-            raise CmmUqError(
-                f"time = {moment.isoformat()!r} has {has}, and {'start' if start else 'the first line'} {other}",
-                where=table.at(row), fix="Give the zone of all of them, such as +02:00, or of none",
-            )  # fmt: skip
+            said = f"time = {moment.isoformat()!r} has {has}, and {'start' if start else 'the first line'} {other}"
+            fix = "Give the zone of all of them, such as +02:00, or of none"
+            raise CmmUqError(said, where=table.at(row), fix=fix)
     # without a zone the clock is taken as it is, so that no change to summer time tears the log
     begin = start or datetime(1970, 1, 1, tzinfo=UTC if first.tzinfo else None)
     return np.array([(moment - begin).total_seconds() for moment in moments])
@@ -304,12 +281,14 @@ def with_logged(points: Points, log: TemperatureLog | None, toml: Path, recordin
     """The points of a recording with the temperatures of their scales."""
     if log is None:
         return points
-    recorded = [name for name in COLUMNS if name in points.columns]
+    recorded, problem = [name for name in COLUMNS if name in points.columns], ""
     if recorded:
-        raise CmmUqError(f"the recording has {recorded[0]}, and the log gives it as well", where=f"{toml}: {LOG}",
-                         fix=f"Leave out the log, or {', '.join(COLUMNS)} in {recording}")  # fmt: skip
-    if "time_s" not in points.columns:
-        raise CmmUqError("the recording has no times to be joined by", where=f"{toml}: {LOG}",
-                         fix=f"Record time_s in {recording}, by the clock of the log")  # fmt: skip
+        problem = f"the recording has {recorded[0]}, and the log gives it as well"
+        fix = f"Leave out the log, or {', '.join(COLUMNS)} in {recording}"
+    elif "time_s" not in points.columns:
+        problem = "the recording has no times to be joined by"
+        fix = f"Record time_s in {recording}, by the clock of the log"
+    if problem:
+        raise CmmUqError(problem, where=f"{toml}: {LOG}", fix=fix)
     scales = log.at(points.columns["time_s"], lambda row: f"{recording} line {points.lines[row]}, column time_s")
     return replace(points, columns={**points.columns, **dict(zip(COLUMNS, scales.T, strict=True))})

@@ -252,17 +252,14 @@ def _places(point: Floats | None, wanted: Sequence[str], held: Sequence[Quantity
     if point is None or any(len(one.values) != len(point) for one in held):
         return None
     scales = [np.array([float(_METRES[unit]) * 1e6 for unit in one.units]) for one in held]
-    names = ["reference_u_um" if name == "reference_mm" else name.replace("reference_", "reference_u_").replace("_mm", "_um")
-             for name in wanted]  # fmt: skip
-    u = {
-        name: scale * np.array([float(stated.u or 0) for stated in one.uncertainties])
-        for name, one, scale in zip(names, held, scales, strict=True)
-    }
-    whole = all(one.covariance is not None and len(one.covariance[0]) == len(point) for one in held)
+    stated = [np.array([float(each.u or 0) for each in one.uncertainties]) for one in held]
+    names = (name.replace("reference_", "reference_u_").replace("mm", "um") for name in wanted)
+    u = {name: scale * own for name, scale, own in zip(names, scales, stated, strict=True)}
+    matrices = [one.covariance[0] for one in held if one.covariance is not None]
+    whole = len(matrices) == len(held) and all(len(matrix) == len(point) for matrix in matrices)
     covariances = tuple(
-        np.outer(scale, scale) * np.array([[float(value) for value in row] for row in one.covariance[0]])
-        for one, scale in zip(held, scales, strict=True)
-        if whole and one.covariance is not None
+        np.outer(scale, scale) * np.array([[float(value) for value in row] for row in matrix])
+        for matrix, scale in zip(matrices if whole else (), scales, strict=whole)
     )
     return PointUncertainties(tuple(int(number) for number in point), u, covariances)
 

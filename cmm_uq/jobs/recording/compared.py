@@ -23,16 +23,16 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.csv_table import Cells, cells_of, numbers
+from cmm_uq.base.files.csv_table import CsvTable, cells_of, numbers
 from cmm_uq.base.files.limits import MAPS, text_of
-from cmm_uq.base.files.table import AnyFloat, JobTable, Length, Names, Uncertainty, key
+from cmm_uq.base.files.table import AnyFloat, Expansion, JobTable, Length, Names, Uncertainty, key
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, WHOLE, largest
 from cmm_uq.jobs.importing.format import Recognition
 from cmm_uq.jobs.importing.header import COVERAGE
 from cmm_uq.jobs.importing.recording import imported_references
-from cmm_uq.jobs.tables.artefact import LARGEST_CTE, ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.length_formula import divisor_of
 from cmm_uq.jobs.tables.machine import ErrorMapFile
 
@@ -141,12 +141,9 @@ NOISE_RATIO = "noise_ratio"  # column: standard uncertainty of a difference over
 
 def refuse_copy(points: Points, earlier: Points, planned: bool, where: str) -> None:
     """Refuse an earlier recording that has the same coordinates to the last digit: it says nothing of a change."""
-    now, then = (
-        np.column_stack([one.measurement, one.point, one.repeat, one.xyz])[
-            np.lexsort((one.repeat, one.point, one.measurement))
-        ]
-        for one in (points, earlier)
-    )
+    orders = (np.lexsort((one.repeat, one.point, one.measurement)) for one in (points, earlier))
+    every = (np.column_stack([one.measurement, one.point, one.repeat, one.xyz]) for one in (points, earlier))
+    now, then = (rows[order] for rows, order in zip(every, orders, strict=True))
     if not planned and np.array_equal(now, then):
         problem = "is the recording itself to the last digit, of which no reading was made again"
         raise CmmUqError(problem, where=where, fix="Name the recording of the earlier date")
@@ -218,7 +215,7 @@ class SimulationFacts(JobTable):
     u_common_um: Uncertainty = key(0.0, "Standard uncertainty of the artefact's size that all predictions share.")
     length_mm: Length | None = None
     """Length of the artefact, as the simulation took it; otherwise that of [artefact]."""
-    cte_per_k: AnyFloat | None = None
+    cte_per_k: Expansion | None = None
     """Coefficient of thermal expansion of the artefact, 1/K, as the simulation took it; otherwise that of [artefact]."""
     temperature_c: AnyFloat | None = None
     """Temperature of the artefact, as the simulation took it; otherwise `temp_artefact_c` as recorded."""
@@ -242,8 +239,6 @@ class SimulationFacts(JobTable):
             yield "refit = true says nothing of what: name the effects that the simulation contains"
         if any(given.covariance is not None for given in self.map):
             yield "a covariance belongs to a map under [machine], whose corrections are made with it: leave it out"
-        if abs(self.cte_per_k or 0.0) > LARGEST_CTE:
-            yield f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
         for name in ("length_mm", "cte_per_k", "temperature_c", "unit", "columns"):
             if self.map and name in self.model_fields_set:
                 yield f"{name} belongs to a file of predictions, not to a map: leave it out"
@@ -282,12 +277,8 @@ class Prediction:
 def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Prediction:
     cells = _table(content, where)
     table: dict[str, Floats] = {}
-
-    def place(column: int, row: int) -> str:
-        return f"{where} line {cells.lines[row]}, column {cells.header[column]}"
-
     for column, i in _places(cells, where, facts).items():
-        at = partial(place, i)
+        at = partial(cells.at, column=cells.header[i])
         values = numbers([row[i] for row in cells.rows], at)
         table[column] = values * (UNIT_MM[facts.unit] if column in (*COORDINATES, LENGTH) else 1.0)
         _check_size(table[column], column, at)
@@ -300,7 +291,14 @@ def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Predi
         table[LENGTH] if lengths else np.zeros(0), MICROMETRE * table.get(UNCERTAINTY, np.full(count, facts.u_um)),
         np.array(cells.lines, dtype=np.int64),
     )  # fmt: skip
-    _check_unique(prediction)
+    seen: dict[tuple[float, ...], int] = {}
+    keys = np.column_stack([prediction.measurement, prediction.point, table.get("repeat", np.ones(count))]).tolist()
+    for (measurement, point, repeat), line in zip(keys, cells.lines, strict=True):
+        other = seen.setdefault((measurement, point, repeat), line)
+        if other != line:
+            of = f"measurement {measurement:g}" + ("" if lengths else f", point {point:g}")
+            fix = "Number repeats in a column repeat, as the recording does, or keep one"
+            raise CmmUqError(f"{of} is predicted twice", where=f"{where} lines {other} and {line}", fix=fix)
     return prediction
 
 
@@ -309,7 +307,7 @@ def is_error_map(content: bytes, where: str) -> bool:
     return set(_OF_A_MAP) <= {name.strip() for name in _header(text_of(content, where, _FIX)).split(",")}
 
 
-def _table(content: bytes, where: str) -> Cells:
+def _table(content: bytes, where: str) -> CsvTable:
     head = _header(text_of(content, where, _FIX))
     delimiter = ";" if ";" in head else "\t" if "\t" in head else ","
     cells = cells_of(content, where, _FIX, delimiter=delimiter)
@@ -321,7 +319,7 @@ def _table(content: bytes, where: str) -> Cells:
             raise CmmUqError(f"has {len(row)} cells where the header has {width}", where=f"{where} line {line}",
                              fix="Complete the row; a decimal comma needs semicolons between cells")  # fmt: skip
     rows = [[_plain(cell, decimal_comma=delimiter != ",") for cell in row] for row in cells.rows]
-    return Cells(cells.header, cells.header_line, rows, cells.lines)
+    return replace(cells, rows=rows)
 
 
 def _header(text: str) -> str:
@@ -336,7 +334,7 @@ def _plain(cell: str, *, decimal_comma: bool) -> str:
     return _FORTRAN.sub(r"\1e\2", cell) if _FORTRAN.fullmatch(cell) else cell
 
 
-def _places(cells: Cells, where: str, facts: SimulationFacts) -> dict[str, int]:
+def _places(cells: CsvTable, where: str, facts: SimulationFacts) -> dict[str, int]:
     """Where in a row the columns stand that are read, by the recording's names."""
     header, at = cells.header, f"{where} line {cells.header_line}"
     if unknown := next((name for name in facts.columns if name not in KNOWN), None):
@@ -374,18 +372,5 @@ def _check_size(values: Floats, column: str, at: Callable[[int], str]) -> None:
     beyond = np.abs(values) > largest(column)
     if np.any(bad | beyond):
         i = int(np.argmax(bad | beyond))
-        raise CmmUqError(f"{values[i]:g} {'is more than anything that is measured' if beyond[i] else why}", where=at(i),
-                         fix="Check the column and its unit")  # fmt: skip
-
-
-def _check_unique(prediction: Prediction) -> None:
-    repeat = np.ones_like(prediction.lines) if prediction.repeat is None else prediction.repeat
-    seen: dict[tuple[int, ...], int] = {}
-    keys = np.column_stack([prediction.measurement, prediction.point, repeat]).tolist()
-    for row, line in zip(map(tuple, keys), prediction.lines.tolist(), strict=True):
-        if row in seen:
-            point = "" if prediction.of_lengths else f", point {row[1]}"
-            raise CmmUqError(f"measurement {row[0]}{point} is predicted twice",
-                             where=f"{prediction.where} lines {seen[row]} and {line}",
-                             fix="Number repeats in a column repeat, as the recording does, or keep one")  # fmt: skip
-        seen[row] = line
+        why = "is more than anything that is measured" if beyond[i] else why
+        raise CmmUqError(f"{values[i]:g} {why}", where=at(i), fix="Check the column and its unit")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
-from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length, key, required
+from cmm_uq.base.files.table import Column, Expansion, JobTable, Length, key, required
 from cmm_uq.base.messages import Text, day, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.format import FileKeys
@@ -40,8 +40,6 @@ class CertifiedValue:
         """Whether it is in µm, and not in mm."""
         return self.key.endswith("_um")
 
-
-LARGEST_CTE = 1e-3  # 1/K, of any solid
 
 LENGTH_WORDS = ("length", "distance", "länge", "abstand", "longueur", "長さ", "距離")
 DIAMETER_WORDS = ("diameter", "durchmesser", "diamètre", "直径")
@@ -164,7 +162,7 @@ class ArtefactFacts(JobTable):
     degrees_of_freedom: Freedom | None = None
     """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them. Figures and
     decisions take u of the normal distribution with the same 95 % interval."""
-    cte_per_k: AnyFloat = 0.0
+    cte_per_k: Expansion = 0.0
     """Coefficient of thermal expansion of the artefact, 1/K; its recorded temperature `temp_artefact_c` is corrected
     by it."""
     certificate: CertificateFile | None = None
@@ -180,8 +178,6 @@ class ArtefactFacts(JobTable):
             yield "degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out"
         if self.u_um is not None and self.length_mm is None and not self.with_references:
             yield "u_um is given without length_mm: give both, or neither for an uncalibrated artefact"
-        if abs(self.cte_per_k) > LARGEST_CTE:
-            yield f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
 
     def u_of(self, lengths_mm: Floats | float) -> Floats:
         """Standard uncertainty of certified lengths, µm, as stated for them; 0 where nothing is."""

@@ -17,6 +17,7 @@ from cmm_uq.base.errors import suggestion
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import (
     LARGEST_UM,
+    RISING,
     Divisor,
     JobTable,
     Limit,
@@ -150,7 +151,7 @@ LINE_KEYS = {
     "fixturing": "u_fixturing_um", "form": "u_form_um", "repeat": "u_repeat_um",
 }  # fmt: skip
 TEST_KEYS = tuple(LINE_KEYS.values())
-Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2)]
+Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2), RISING]
 Kelvins = Annotated[float, Field(gt=0, le=1000)]
 
 
@@ -164,10 +165,6 @@ class RatedConditions(JobTable):
     stylus: str | None = key(None, "Stylus for which the limits hold, as `[probe]` names it.")
     declared: Declared | None = None
     """By whom and why the test counts as one under rated conditions, where no rated temperature is stated."""
-
-    def problems(self) -> Iterator[str]:
-        if self.temperature_c is not None and not self.temperature_c[0] < self.temperature_c[1]:
-            yield f"temperature_c = {self.temperature_c}: the first number must be the lower one"
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,8 @@ def check_examples(toml: bytes, origin: str, where: str) -> None:
     wrong = Gathered()
     for number, line in enumerate(toml.decode("utf-8-sig").splitlines(), 1):
         if found := _EXAMPLE.match(line):
-            wrong.add(CmmUqError(f"{found[1]} is still an example's", where=f"{where} line {number}",
-                                 fix=f"Put in your own, or leave it out, and take the word {EXAMPLE} away"))  # fmt: skip
+            wrong.tell(f"{found[1]} is still an example's", where=f"{where} line {number}",
+                       fix=f"Put in your own, or leave it out, and take the word {EXAMPLE} away")  # fmt: skip
     wrong.refuse()
 
 

@@ -6,6 +6,7 @@ import datetime as dt
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
@@ -15,6 +16,7 @@ from cmm_uq.base.files.table import (
     Length,
     Limit,
     Number,
+    Position,
     Positive,
     Range,
     Temperature,
@@ -23,7 +25,6 @@ from cmm_uq.base.files.table import (
     key,
     required,
 )
-from cmm_uq.jobs.arms import MOST_JOINTS, ArmFacts, JointFacts
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -73,8 +74,6 @@ class Travel(JobTable):
     def problems(self) -> Iterator[str]:
         for axis in "xyz":
             travel = getattr(self, axis)
-            if travel and not travel[0] < travel[1]:
-                yield f"{axis} = {travel}: the first number must be the lower one"
             if travel and travel[1] - travel[0] < SHORTEST_TRAVEL_MM:
                 yield f"{axis} = {travel}: a travel of less than {SHORTEST_TRAVEL_MM:g} mm is none"
 
@@ -198,8 +197,6 @@ class RotaryTableFacts(JobTable):
     """Lowest and highest reading of the table."""
 
     def problems(self) -> Iterator[str]:
-        if self.travel_deg and not self.travel_deg[0] < self.travel_deg[1]:
-            yield f"travel_deg = {self.travel_deg}: the first number must be the lower one"
         if self.coordinates == "machine" and self.axis_mm is None:
             yield 'coordinates = "machine" are turned back about the table\'s axis: give a point of it, axis_mm = [x, y, z]'
 
@@ -228,9 +225,8 @@ class AxisFacts(JobTable):
     play_um: Limit | None = key(None, "Largest difference of readings of one place reached from either side.")
 
     def problems(self) -> Iterator[str]:
-        figures = [
-            name for name in ("period_mm", "interpolation_um", "deviation", "grade", "play_um") if getattr(self, name)
-        ]
+        stated = ("period_mm", "interpolation_um", "deviation", "grade", "play_um")
+        figures = [name for name in stated if getattr(self, name)]
         if self.reading == "unknown" and (figures or self.source):
             yield f'reading = "unknown" knows no {(figures or ["source"])[0]}: leave it out, or say how the axis is read'
         if self.reading != "unknown" and not self.source.strip():
@@ -261,17 +257,53 @@ def stated_axes(axes: Iterable[AxisFacts]) -> dict[str, AxisFacts]:
     return {name: one for one in axes if one.reading != "unknown" for name in one.names}
 
 
+MOST_JOINTS = 12
+JointAngle = Annotated[float, Field(ge=-720, le=720)]
+
+
+class JointFacts(JobTable):
+    """One ``[[machine.joint]]``: a Denavit–Hartenberg row. The joints read `q1_deg`, `q2_deg` and so on."""
+
+    type: Literal["revolute", "prismatic"] = key("revolute", "Whether the joint turns, or shifts and reads `q3_mm`.")
+    a_mm: Position = key(0.0, "Length a of the link, along x.")
+    alpha_deg: JointAngle = key(0.0, "Twist α of the link, about x.")
+    d_mm: Position = key(0.0, "Offset d along z; of a prismatic joint where it reads 0.")
+    theta_deg: JointAngle = key(0.0, "Angle θ about z; of a revolute joint where it reads 0.")
+    beta_deg: JointAngle = key(0.0, "Hayati's angle β about y, between axes that are nearly parallel.")
+    reversed: bool = key(False, "Whether the reading counts against the right hand about z, or against z.")
+    travel: Range | None = key(None, "Lowest and highest reading, in degrees or mm.")
+
+    @property
+    def row(self) -> tuple[float, ...]:
+        angles = self.alpha_deg, self.theta_deg, self.beta_deg
+        alpha, theta, beta = (float(np.radians(angle)) for angle in angles)
+        return self.a_mm, alpha, self.d_mm, theta, beta
+
+
+class ArmFacts(JobTable):
+    """``arm``: what holds for all of its joints."""
+
+    convention: Literal["standard", "modified"] = "standard"
+    """Whether rows are standard, θ d a α from this joint to the next, or modified (Craig), α a θ d from the one before."""
+    tool_mm: Triple = [0.0, 0.0, 0.0]
+    """What is measured on the flange, in the frame of the last row: a ball, a stylus, a reflector. Of several reflectors the
+    recording has how far each is beyond it, `tip_x_mm`, `tip_y_mm`, `tip_z_mm`."""
+    up: Triple = [0.0, 0.0, 1.0]
+    """The direction against gravity in the frame of the base, for how joints sag: an arm on the ceiling has [0, 0, -1]."""
+
+    def problems(self) -> Iterator[str]:
+        if not any(self.up):
+            yield "up = [0, 0, 0] is no direction"
+
+
 class FurtherFacts(JobTable):
     """One ``further``: another certificate of the machine, of another artefact or of another day."""
 
-    certificate: Annotated[str, Field(min_length=1, max_length=100)] = required(
-        "The certificate (PDF, or XML with its inputs), or the folder with it, inside the job's."
-    )
-    corrected: bool = key(
-        False,
-        "Whether the machine corrected what its calibration found while that recording was made; the artefact is then "
-        "seen by a corrected machine.",
-    )
+    certificate: Annotated[str, Field(min_length=1, max_length=100)]
+    """The certificate (PDF, or XML with its inputs), or the folder with it, inside the job's."""
+    corrected: bool = False
+    """Whether the machine corrected what its calibration found while that recording was made; the artefact is then seen by a
+    corrected machine."""
 
 
 FurtherList = Annotated[list[FurtherFacts], Field(max_length=8)]

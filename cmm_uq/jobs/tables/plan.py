@@ -1,4 +1,7 @@
-"""``[plan]``, ``[acquire]`` and ``[prove]``: what may be measured, by which instruments, and what a proof must reach."""
+"""``[plan]``, ``[acquire]`` and ``[prove]``: what may be measured, by which instruments, and what a proof must reach.
+
+``[[effect]]``: physics that a laboratory states in its own job, as a formula with its parameters.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,13 @@ from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED
 from cmm_uq.base.files.table import (
+    RISING,
     AnyFloat,
     Column,
     JobTable,
     Length,
     Names,
+    Pair,
     Range,
     Uncertainty,
     Unit,
@@ -22,6 +27,7 @@ from cmm_uq.base.files.table import (
     key,
     required,
 )
+from cmm_uq.base.messages import Text, Verbatim
 
 Criterion = Literal["separation", "D", "A", "worst"]
 Duration = Annotated[float, Field(ge=0, le=1e6)]  # minutes or seconds
@@ -46,7 +52,7 @@ class FixtureFacts(JobTable):
     directions: Annotated[list[Direction], Field(max_length=LISTED.most)] = []
     """Directions in which a bar or gauge can be held, either way along it, or normals of a plate or triangle; any
     without them."""
-    heights_mm: Range | None = key(None, "Lowest and highest z reading of the artefact's middle.")
+    heights_mm: Pair | None = key(None, "Lowest and highest z reading of the artefact's middle.")
 
     def problems(self) -> Iterator[str]:
         if any(not any(direction) for direction in self.directions):
@@ -104,9 +110,6 @@ class PlanFacts(JobTable):
     """Time that there is, min; unlimited by default."""
 
     def problems(self) -> Iterator[str]:
-        for axis, (low, high) in self.volume_mm.items():
-            if not low < high:
-                yield f"volume_mm: {axis} = [{low:g}, {high:g}]: the first number must be the lower one"
         if self.number is not None and self.more is not None:
             yield "number and more are both given: a plan of so many, or so many beside what there is"
         if self.noise_from is not None and (self.placing_um is not None or self.growth_um is not None):
@@ -171,14 +174,71 @@ class ProveFacts(JobTable):
 
     false_alarms_pct: Annotated[float, Field(gt=0, lt=100)] = 2.0
     """Largest rate of false alarms, in percent of the recordings that hide nothing."""
-    coverage_pct: Annotated[list[Percent], Field(min_length=2, max_length=2)] = [93.0, 97.0]
+    coverage_pct: Annotated[list[Percent], Field(min_length=2, max_length=2), RISING] = [93.0, 97.0]
     """Lowest and highest percentage of 95 % intervals that hold the truth."""
     wrong_names_pct: Annotated[float, Field(gt=0, lt=100)] | None = None
     """Largest percentage of recordings in which an effect is named that does not act."""
     found_pct: Percent | None = None
     """Least percentage of hidden effects that are found, of all strengths that are drawn."""
 
+
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=40)]
+Size = Annotated[float, Field(gt=0, le=1e12), at_least(1e-12)]  # in a unit that only the table itself says
+SHAPES = 2  # parameters that shape an effect, at most
+
+
+class EffectParameter(JobTable):
+    """A number that says how large an effect is, or that shapes it."""
+
+    unit: str = required(
+        "Its unit: `µm`, `µm/m`, `µm/m²`, `ppm`, `″`, `″/m`, `µm/K`, `µm/h`, `h`, …; `1` for a mere number."
+    )
+    prior: Size | None = key(None, "Standard deviation that physics allows, about zero, in its unit.")
+    low: Size | None = key(
+        None, "Least value of one that shapes the effect, in place of `prior`: a length, a time constant."
+    )
+    high: Size | None = key(None, "Largest value of it.")
+
     def problems(self) -> Iterator[str]:
-        low, high = self.coverage_pct
-        if not low < high:
-            yield f"coverage_pct = [{low:g}, {high:g}]: the first number must be the lower one"
+        if self.prior is None and (self.low is None or self.high is None or self.low >= self.high):
+            yield "a parameter has a prior, or a low below a high: give one or the other"
+        if self.prior is not None and not self.low is self.high is None:
+            yield "a parameter has a prior, or low and high: leave one of them out"
+
+
+class EffectFacts(JobTable):
+    """An effect of the laboratory's own."""
+
+    name: Name = required("Its name, by which `[model] effects`, truth.toml and results.json call it.")
+    formula: str | Annotated[list[str], Field(min_length=1, max_length=3)]
+    """The error in mm by the rule *true = indicated + e*, `e_x = k*x*(y - 500)/1000`; several with `;` between, or a list."""
+    title: str = key("", "In a few words, for documents; its name where it is left out.")
+    unit: str | None = key(None, "Unit of `k`, where that is the only parameter.")
+    prior: Size | None = key(None, "Standard deviation of `k` that physics allows, about zero, in its unit.")
+    parameters: Annotated[dict[Name, EffectParameter], Field(max_length=10)] = {}
+    """Parameters by name, where there are others than `k`: `{ bow = { unit = "µm", prior = 5 }, tau = { unit = "h", low = 0.2,
+    high = 20 } }`."""
+    points_to: str = ""
+    """What a technician should look at where it is found, to follow "What it points to:", without a full stop."""
+
+    def problems(self) -> Iterator[str]:
+        alone = self.unit is not None and self.prior is not None
+        if bool(self.parameters) == alone or (self.unit is None) != (self.prior is None):
+            yield "give unit and prior of k, or a table of parameters"
+        if sum(one.low is not None for one in self.parameters.values()) > SHAPES:
+            yield f"more than {SHAPES} parameters have low and high: a diagnosis tries all their values with each other"
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The formula, an equation each."""
+        text = [self.formula] if isinstance(self.formula, str) else self.formula
+        return tuple(part.strip() for one in text for part in one.split(";") if part.strip())
+
+    @property
+    def each(self) -> dict[str, EffectParameter]:
+        """The parameters by name."""
+        return self.parameters or {"k": EffectParameter(unit=self.unit or "1", prior=self.prior)}
+
+    @property
+    def words(self) -> Text:
+        return Verbatim(self.title or self.name.replace("_", " ").capitalize())

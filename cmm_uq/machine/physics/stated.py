@@ -22,7 +22,7 @@ from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import METRE, PRINTED, Unit, unit_as_typed
 from cmm_uq.jobs.columns import COLUMNS, REQUIRED
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.tables.effect import EffectFacts
+from cmm_uq.jobs.tables.plan import EffectFacts
 from cmm_uq.machine.physics.catalogue import beside_the_catalogue, refuse_known
 from cmm_uq.machine.physics.effect import Effect, Nonparametric, Parameter, Shape
 from cmm_uq.machine.physics.effects.joints import effects_of_arm

@@ -47,7 +47,7 @@ def test_points_come_in_the_order_of_the_plan() -> None:
     (content([*rows(), rows()[0]]), "point 1 of 'A' stands there twice"),
     (content([*rows(), "D,1,0,0,0"]), "there is no feature 'D'"),
     (content([*rows(), "A,13,0,0,0"]), "'A' has no point 13"),
-    (content([*rows()[:-1], "bore,24,60,40"]), "has 4 cells, and the header 5"),
+    (content([*rows()[:-1], "bore,24,60,40"]), "has 4 cells where the header has 5"),
     (content([*rows()[:-1], "bore,24,60,40,zero"]), r"points.csv line 61, column z_mm: .* Give a number: every point"),
     (content(rows(), "feature,point,x_mm,y_mm,z"), "has no column 'z_mm'"),
     (content(rows(6.0)), "lies 6 mm from where it is planned"),
@@ -125,7 +125,7 @@ def test_standards_are_read_beside_them() -> None:
 @pytest.mark.parametrize(("change", "words"), [
     (lambda rows: [*rows, rows[1]], r"line 22.*stands there twice for cycle 1, repeat 1"),
     (lambda rows: [*rows, "1,3,nothing,20"], "line 22.*there is no characteristic 'nothing'"),
-    (lambda rows: [*rows[:-1], "10,2,x"], "line 21.*has 3 cells, and the header 4"),
+    (lambda rows: [*rows[:-1], "10,2,x"], "line 21.*has 3 cells where the header has 4"),
     (lambda rows: [*rows[:-1], f"10,2,{SIZE},wide"], "line 21, column value_mm.*not a number"),
     (lambda rows: [*rows[:-1], f"10.5,2,{SIZE},20"], "line 21, column cycle.*no number of a cycle"),
     (lambda rows: [rows[0].replace("cycle", "round"), *rows[1:]], "has no column 'cycle'"),

@@ -182,7 +182,7 @@ CUT = PCDMIS[: PCDMIS.index("     30.011")]
     (HEAD + "1,nan\n", {}, "report line 2: has 'nan' where a number belongs"),
     (HEAD + "1,1e999\n", {}, "report line 2: has '1e999' where a number belongs"),
     (HEAD + "1,\n", {}, "report line 2: has no value where one belongs"),
-    (HEAD + "1\n", {}, "has 1 cells, and the header 2"),
+    (HEAD + "1\n", {}, "has 1 cells where the header has 2"),
     ("characteristic,value_deg\n1,3.5\n", {}, "'1' is an angle, and the job asks for size"),
     ("characteristic,value_inch\n1,1.18\n", {}, "has a column 'value_inch'"),
     ("name,value_mm\n1,1.18\n", {}, "has a column 'name'"),

@@ -81,7 +81,7 @@ def test_squareness_comes_beside_the_map():
         (axis("x", "0,0,0,0,0,0,0"), "axis x has 1 positions"),
         (axis("x", "0,0,0,0,0,0,0", "25,1,,0,0,0,0"), r"line 3: dy_um = '' is no number"),
         (axis("x", "0,0,0,0,0,0,0", "25,1,nan,0,0,0,0"), r"line 3: dy_um = 'nan' is no number"),
-        (axis("x", "0,0,0,0,0,0,0", "25,1,0"), r"line 3: has 4 cells, the header has 8"),
+        (axis("x", "0,0,0,0,0,0,0", "25,1,0"), r"line 3: has 4 cells where the header has 8"),
         (axis("w"), r"line 2: axis 'w'"),
     ],
 )

@@ -10,7 +10,7 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import UNITS, unit_as_typed
-from cmm_uq.jobs.tables.effect import EffectFacts, EffectParameter
+from cmm_uq.jobs.tables.plan import EffectFacts, EffectParameter
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.machine.physics.effect import Nonparametric
 from cmm_uq.machine.physics.stated import StatedEffect, factor_to_mm

@@ -1,27 +1,31 @@
-"""Runs of a laser interferometer in Renishaw's form (``.rtl``): targets, and the deviation of each run at each target.
+"""Lengths and runs on lines, without coordinates: tests after ISO 10360-2 and B89, and laser interferometers along axes.
 
-The form is published nowhere. What is read here is what three public programs that read or write it agree on: sections in
-capitals with two colons; ``Targets :`` in mm, over several lines; below ``Run Target Data:`` the numbers of run and target
-with the deviation in µm, actual less target. Where the axis lies no file says: it is asked for.
+A length on a known line becomes two points a length apart, the first at the line's start, and is a measurement of its own: the
+scatter of both ends stands at the second, so that it is right for their difference. Where lines and axes lie few files say: it
+is asked for. Renishaw's form of runs (``.rtl``) is published nowhere; what is read of it is what three public programs that
+read or write it agree on: sections in capitals with two colons; ``Targets :`` in mm, over several lines; below ``Run Target
+Data:`` the numbers of run and target with the deviation in µm, actual less target.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.messages import Verbatim, say, semicolons
-from cmm_uq.base.points import AXES, Floats, Ints
+from cmm_uq.base.points import AXES, Floats
+from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.blocks import unit_elsewhere
 from cmm_uq.jobs.importing.factors import (
     RUN,
-    Label,
     codes,
     counted,
     in_turn,
@@ -30,11 +34,91 @@ from cmm_uq.jobs.importing.factors import (
     together,
     ways_of,
 )
-from cmm_uq.jobs.importing.format import UNITS, Fact, ImportKeys, NotReadError, Row, Sheet, length_named, sheets_of
+from cmm_uq.jobs.importing.format import (
+    LINE_PLACE,
+    UNITS,
+    Fact,
+    ImportKeys,
+    NotReadError,
+    Row,
+    Sheet,
+    length_named,
+    sheets_of,
+)
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
-from cmm_uq.jobs.importing.lengths import place_of
 from cmm_uq.jobs.importing.reports import TextReport
 from cmm_uq.jobs.importing.roles import SheetReading
+
+REFERENCE = "reference_mm"
+COLUMNS = ("line", "length_mm", "nominal_mm", "deviation_um", "deviation_mm", REFERENCE, "repeat")
+"""Columns of a table of lengths, which a job may name."""
+
+
+@dataclass
+class MeasuredLengths:
+    """Lengths of a sheet, of each its line by name, reference, run, measured value, mm, and line of the file."""
+
+    names: list[str]
+    reference: list[float | None]
+    repeat: list[int]
+    measured: list[float]
+    lines: list[int]
+    beside: dict[str, list[float]]
+    sources: dict[str, str]
+    facts: tuple[Fact, ...]
+    left_out: tuple[str, ...]
+
+
+def placed(
+    table: MeasuredLengths, keys: ImportKeys, where: str
+) -> tuple[dict[str, NDArray[Any]], tuple[Fact, ...], list[int]]:
+    """Columns of a recording, (2n,): both ends of every length, where the job says that its line lies; lines of the file."""
+    wanted = list(dict.fromkeys(table.names))
+    if lacking := [name for name in wanted if name not in keys.lines]:
+        lie = f"lines {', '.join(map(repr, lacking))} lie" if len(lacking) > 1 else f"line {lacking[0]!r} lies"
+        fix = f'Say it, with its start in mm: lines = {{ "{lacking[0]}" = "along X from 100,200,300" }}'
+        raise CmmUqError(f"nothing says where {lie}, along which lengths were measured", where=where, fix=fix)
+    if unknown := [name for name in keys.lines if name not in wanted]:
+        raise CmmUqError(f"has no line {unknown[0]!r}", where=where, fix=suggestion(unknown[0], wanted))
+    bare = [reference is None for reference in table.reference]
+    if any(bare) and not all(bare):
+        raise CmmUqError("a length has no nominal length, and others have one",
+                         where=f"{where} line {table.lines[bare.index(True)]}",
+                         fix="Give it for all, or read the sheets one by one: sheet")  # fmt: skip
+    number: dict[tuple[str, float | None], int] = {}
+    keyed = zip(table.names, table.reference, strict=True)
+    measurements = [number.setdefault(key, len(number) + 1) for key in keyed]
+    lines = [place_of(keys.lines[name]) for name in table.names]
+    start, way = (np.array([line[k] for line in lines]) for k in (0, 1))
+    xyz = np.stack([start, start + np.array(table.measured)[:, None] * way], axis=1).reshape(-1, 3)
+    columns = {
+        "measurement": np.repeat(measurements, 2), "point": np.tile([1, 2], len(lines)), "repeat": np.repeat(table.repeat, 2),
+        **dict(zip(COORDINATES, xyz.T, strict=True)),
+    }  # fmt: skip
+    if not all(bare):
+        columns[REFERENCE] = np.array([[0.0, reference] for reference in table.reference], dtype=np.float64).ravel()
+    columns |= {name: np.repeat(values, 2) for name, values in table.beside.items()}
+    told = [say("{name}: {place}", name=Verbatim(name), place=Verbatim(keys.lines[name])) for name in wanted]
+    return columns, (Fact("lines", say("Lines"), semicolons(told)),), [line for line in table.lines for _ in range(2)]
+
+
+def place_of(text: str) -> tuple[Floats, Floats]:
+    """Start (3,) and direction (3,) of a line."""
+    parts = LINE_PLACE.fullmatch(text.strip())
+    if parts is None:
+        raise CmmUqError(f"{text!r} says no place", where="lines", fix='Write "along X from 100,200,300"')
+    figures = [float(figure.replace("−", "-")) for figure in parts.groups()[2:] if figure]
+    start = np.array(figures[:3])
+    if parts[2]:
+        direction = np.zeros(3)
+        direction["xyz".index(parts[2].lower())] = 1.0 if parts[1] in ("", "+") else -1.0
+    else:
+        direction = np.array(figures[3:]) - start
+        if not direction.any():
+            raise CmmUqError(f"{text!r} begins where it ends", where="lines", fix="Say two places of the line")
+        direction /= np.linalg.norm(direction)
+    return start, direction
+
 
 _SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
 _LINEAR, _TRIPLE = {"linear", ""}, 3
@@ -65,19 +149,11 @@ def placed_runs(runs: Sequence[AxisRun], keys: ImportKeys, where: str, facts: Se
             raise CmmUqError(f"nothing says where line {axis!r} lies, along which was measured", where=where, fix=fix)
     for run in runs:
         start, direction = place_of(keys.lines[run.axis])
-        first = 0 if run.way >= 0 else len(run.targets)
+        measurement, first = axes.index(run.axis) + 1, 0 if run.way >= 0 else len(run.targets)
+        approach = run.way * np.sign(direction) + 0.0
         for k, (target, deviation, line) in enumerate(run.targets, 1):
-            place = start + target * direction
-            cells = [
-                axes.index(run.axis) + 1,
-                first + k,
-                run.number,
-                *place,
-                deviation,
-                *direction,
-                *(run.way * np.sign(direction) + 0.0),
-            ]
-            rows.append(("", [f"{cell:.10g}" for cell in cells], line))
+            reading = (*(start + target * direction), deviation, *direction, *approach)
+            rows.append(("", [f"{cell:.10g}" for cell in (measurement, first + k, run.number, *reading)], line))
     told = Fact("lines", say("Lines"), semicolons([Verbatim(f"{axis}: {keys.lines[axis]}") for axis in axes]))
     return sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, told))
 
@@ -102,14 +178,10 @@ class _Runs:
                 self.targets += self._figures(text, f"{where} line {number}")
             elif section == "DEVIATIONS" and part.startswith("run target data"):
                 figures = self._figures(text, f"{where} line {number}")
-                if (
-                    len(figures) != _TRIPLE
-                    or figures[0] % 1
-                    or not 1 <= figures[1] <= len(self.targets)
-                    or figures[1] % 1
-                ):
+                run, target, deviation = figures if len(figures) == _TRIPLE else (0.0, 0.0, 0.0)
+                if run % 1 or target % 1 or not 1 <= target <= len(self.targets):
                     raise CmmUqError("is no run, target and deviation", where=f"{where} line {number}", fix=_AGAIN)
-                self.runs.setdefault(int(figures[0]), []).append((int(figures[1]) - 1, figures[2], number))
+                self.runs.setdefault(int(run), []).append((int(target) - 1, deviation, number))
         self._check(where)
 
     def _check(self, where: str) -> None:
@@ -131,13 +203,6 @@ class _Runs:
             raise CmmUqError(f"{text[:_SHOWN]!r} holds no figures", where=place, fix=_AGAIN)
         return list(map(float, figures))
 
-    def ways(self) -> Iterator[tuple[int, float]]:
-        """Number and sense of each run: by the order of its targets; none where all are listed in the same one."""
-        senses = [float(np.sign(rows[-1][0] - rows[0][0])) for rows in self.runs.values()]
-        both = len(set(senses)) > 1
-        for i, sense in enumerate(senses):
-            yield senses[: i + 1].count(sense), sense if both else 0.0
-
 
 class Rtl(TextReport):
     name, title = "rtl", say("Laser interferometer (RTL)")
@@ -152,18 +217,22 @@ class Rtl(TextReport):
 
     def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
         found = _Runs(lines, where)
-        axis = found.facts.get("axis", "") or "1"
-        runs = [AxisRun(axis, int(way), number, [(found.targets[k], deviation, line) for k, deviation, line in own])
-                for own, (number, way) in zip(found.runs.values(), found.ways(), strict=True)]  # fmt: skip
+        axis, runs = found.facts.get("axis", "") or "1", list[AxisRun]()
+        # the order of its targets says the sense of a run; none where all are listed in the same one
+        senses = [int(np.sign(rows[-1][0] - rows[0][0])) for rows in found.runs.values()]
+        for i, (sense, own) in enumerate(zip(senses, found.runs.values(), strict=True)):
+            targets = [(found.targets[k], deviation, line) for k, deviation, line in own]
+            way = sense if len(set(senses)) > 1 else 0
+            runs.append(AxisRun(axis, way, senses[: i + 1].count(sense), targets))
         return placed_runs(runs, keys, where, (encoding,))
 
 
 _MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
 
 
-def axis_runs(reading: SheetReading, labels: Sequence[Label], sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
+def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
     """Runs along axes, each with its targets in turn."""
-    figures = np.array(reading.figures)
+    figures, labels = np.array(reading.figures), reading.every_label
     if (angle := _angle_in(sheets)) is not None:
         fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
         raise NotReadError(f"its deviations may be angles ({angle!r})", where=where, fix=fix)
@@ -173,25 +242,24 @@ def axis_runs(reading: SheetReading, labels: Sequence[Label], sheets: Sequence[S
     if small is None and np.abs(figures[:, 1]).max() < _MILLIMETRES:
         fix = "Write it above them: (µm) or (mm)"
         raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
-    small = small or UNITS["um"]
     target = units.converted(figures[:, 0], unit, "x_mm")
-    deviation = units.converted(figures[:, 1], small, "reading_um")
-    texts = ([f"{label.words} {value}" for value in label.values] for label in labels)
-    named = ([axis_in(text) for text in own] for own in texts)
+    deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um")
+    named = ([axis_in(f"{label.words} {value}") for value in label.values] for label in labels)
     axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
     ways = next((found for label in labels if (found := ways_of(label.values)) is not None), None)
     parts = [part for label in labels for part in (label, *parts_of(label))]
     run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
     key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
     numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
-    if ways is None:
-        ways = _by_order(target, numbers)
+    if ways is None:  # by the order of their targets; none where all are listed in one order
+        ends = {n: target[numbers == n][[0, -1]] for n in np.unique(numbers).tolist()}
+        senses = {n: int(np.sign(last - first)) for n, (first, last) in ends.items()}
+        ways = [senses[n] if len({*senses.values()}) > 1 else 0 for n in numbers.tolist()]
     runs: dict[tuple[str, int, int], AxisRun] = {}
-    for k, one in enumerate(zip(axes, ways, numbers.tolist(), strict=True)):
-        runs.setdefault(one, AxisRun(*one, [])).targets.append(
-            (float(target[k]), float(deviation[k]), reading.lines[k])
-        )
-    if any(len({t for t, _, _ in one.targets}) < len(one.targets) for one in runs.values()):
+    rows = zip(target.tolist(), deviation.tolist(), reading.lines, strict=True)
+    for one, row in zip(zip(axes, ways, numbers.tolist(), strict=True), rows, strict=True):
+        runs.setdefault(one, AxisRun(*one, [])).targets.append(row)
+    if any(len({t for t, _, _ in run.targets}) < len(run.targets) for run in runs.values()):
         raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
     return list(runs.values())
 
@@ -202,10 +270,10 @@ _AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES
 
 def _angle_in(sheets: Sequence[Sheet]) -> str | None:
     """A text that says that deviations are angles."""
-    known = {f" {word} " for words in words_of("angles").values() for word in words}
+    known = [word for words in words_of("angles").values() for word in words]
     for text in (cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str) and cell):
         plain = f" {' '.join(plain_words(text))} "
-        if any(word in plain or (unspaced(word.strip()) and word.strip() in plain) for word in known):
+        if any(f" {word} " in plain or (unspaced(word) and word in plain) for word in known):
             return text
     return None
 
@@ -219,9 +287,3 @@ def _axis_of(sheets: Sequence[Sheet]) -> str:
     """The axis that the first texts of a file name."""
     texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
     return next(filter(None, map(axis_in, texts)), "1")
-
-
-def _by_order(target: Floats, numbers: Ints) -> list[int]:
-    """Senses of runs by the order of their targets; 0 where all are listed in one order."""
-    senses = {n: int(np.sign(target[numbers == n][-1] - target[numbers == n][0])) for n in np.unique(numbers).tolist()}
-    return [senses[n] if len({*senses.values()}) > 1 else 0 for n in numbers.tolist()]

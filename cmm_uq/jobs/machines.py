@@ -1,0 +1,123 @@
+"""The machine that a job describes, by its chain or its joints, and recorded coordinates as those of its artefact."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.base.arm import Arm
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES, Floats, Machine, Points
+from cmm_uq.base.rotary import Turntable
+from cmm_uq.jobs.columns import COORDINATES, REQUIRED
+from cmm_uq.jobs.tables.machine import MachineFacts, stated_axes
+
+_FINEST = 9  # decimals of a number that is looked at as printed
+_ROUNDING = 1e-6  # of a reading, °
+
+
+def machine_of(facts: MachineFacts) -> Machine:
+    """Of three carriages, or with a rotary table too; or an arm of joints."""
+    if facts.joint:
+        return _arm(facts)
+    travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
+    carriages, _, letter = facts.chain.partition("|")
+    every = (facts.name, carriages, travel, np.array(facts.origin_mm, dtype=np.float64))
+    read_by, table = stated_axes(facts.axes), facts.table
+    if not letter:
+        return Machine(*every, read_by=read_by)
+    axis = None if table.axis_mm is None else np.array(table.axis_mm, dtype=np.float64)
+    turns = np.array(table.travel_deg or [np.nan, np.nan], dtype=np.float64)
+    return Turntable(
+        *every, read_by=read_by, letter=letter.lower(), axis_mm=axis, travel_deg=turns,
+        clockwise=table.turns == "clockwise", recorded_in_machine=table.coordinates == "machine",
+    )  # fmt: skip
+
+
+def in_coordinates(points: Points, where: str) -> Points:
+    """A recording at the coordinates of what was measured; what does not go with its machine's rotary table is refused."""
+    machine = points.machine
+    if not isinstance(machine, Turntable) or machine.column not in points.columns:
+        return points
+    read, (low, high) = points.columns[machine.column], machine.travel_deg
+    beyond = (read < low - _ROUNDING) | (read > high + _ROUNDING)
+    if beyond.any():
+        row = int(np.argmax(beyond))
+        said = f"{machine.column} = {read[row]:g} lies outside the travel of the table, {low:g} to {high:g} °"
+        fix = "Mend it, or travel_deg in [machine.table]"
+        raise CmmUqError(said, where=f"{where} line {points.lines[row]}", fix=fix)
+    if np.any(read) and any(f"n{axis}" in points.columns for axis in AXES):
+        said = "has normals of probed points, which do not say with a turned table whether they turned with it"
+        fix = f"Leave nx, ny, nz out, or measure with the table at 0 and leave {machine.column} out"
+        raise CmmUqError(said, where=where, fix=fix)
+    return replace(points, xyz=machine.from_recorded(points.xyz, points.columns))
+
+
+def _arm(facts: MachineFacts) -> Arm:
+    joints, up = facts.joint, np.array(facts.arm.up, dtype=np.float64)
+    return Arm(
+        facts.name,
+        rows=np.array([joint.row for joint in joints]),
+        modified=facts.arm.convention == "modified",
+        revolute=np.array([joint.type == "revolute" for joint in joints]),
+        sense=np.array([-1.0 if joint.reversed else 1.0 for joint in joints]),
+        tool_mm=np.array(facts.arm.tool_mm),
+        up=up / np.linalg.norm(up),
+        limits=np.array([joint.travel or [np.nan, np.nan] for joint in joints]),
+    )
+
+
+def required_columns(machine: Machine, header: Collection[str]) -> Sequence[str]:
+    """Columns that a recording must have; coordinates of an arm follow from what its joints read, and may be left out."""
+    if not isinstance(machine, Arm):
+        return REQUIRED
+    recorded = COORDINATES if any(name in header for name in COORDINATES) else ()
+    return (*(name for name in REQUIRED if name not in COORDINATES), *recorded, *machine.columns_of_joints)
+
+
+def coordinates(machine: Machine, table: Mapping[str, Floats], lines: Sequence[int], name: str) -> Floats:
+    """Coordinates (n, 3), mm, of a recording: as recorded, or by the joints of an arm."""
+    if isinstance(machine, Arm):
+        return by_joints(machine, table, lines, name)
+    return np.column_stack([table[column] for column in COORDINATES])
+
+
+def by_joints(machine: Arm, table: Mapping[str, Floats], lines: Sequence[int], name: str) -> Floats:
+    """Coordinates (n, 3), mm, by what the joints read. Others, and readings beyond a joint's travel, are refused.
+
+    Recorded coordinates and readings may be rounded as their digits show.
+    """
+    if missing := [column for column in machine.columns_of_joints if column not in table]:
+        raise CmmUqError(f"no column {missing[0]!r}", where=name, fix="Record what each joint reads")
+    read = np.column_stack([table[column] for column in machine.columns_of_joints])
+    beyond = (read < machine.limits[:, 0] - 1e-6) | (read > machine.limits[:, 1] + 1e-6)
+    if beyond.any():
+        row, joint = np.argwhere(beyond)[0]
+        low, high = machine.limits[joint]
+        said = f"{read[row, joint]:g} lies outside the travel of the joint, {low:g} to {high:g}"
+        at = f"{name} line {lines[row]}, column {machine.columns_of_joints[joint]}"
+        raise CmmUqError(said, where=at, fix="Mend it, or travel in [[machine.joint]]")
+    pose = machine.posed(table)
+    xyz = np.asarray(pose.tool - machine.origin_mm)
+    if COORDINATES[0] in table:
+        recorded = np.column_stack([table[column] for column in COORDINATES])
+        turns, shifts = _step(read[:, machine.revolute]), _step(read[:, ~machine.revolute])
+        reach = 1.0 + float(np.linalg.norm(pose.tool[:, None, None] - pose.origins, axis=3).max(initial=0.0))
+        off = np.linalg.norm(recorded - xyz, axis=1)
+        rounded = reach * np.radians(turns) * machine.revolute.sum() + shifts * (~machine.revolute).sum()
+        if np.any(off > _step(recorded) + 0.5 * float(rounded)):
+            row = int(np.argmax(off))
+            said = f"x_mm, y_mm, z_mm lie {off[row]:.4g} mm from where [[machine.joint]] has the tool at these readings"
+            fix = (
+                "Mend rows, convention, reversed or tool_mm; or leave the coordinates out: they follow from the joints"
+            )
+            raise CmmUqError(said, where=f"{name} line {lines[row]}", fix=fix)
+    return xyz
+
+
+def _step(values: Floats) -> float:
+    """The last decimal that numbers are printed with."""
+    decimals = (d for d in range(_FINEST) if np.allclose(values, np.round(values, d), rtol=0, atol=10.0 ** (-d - 4)))
+    return 10.0 ** -next(decimals, _FINEST)
