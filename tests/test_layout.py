@@ -26,10 +26,10 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 3_127, "maths": 10_781, "jobs": 15_076, "machine": 7_804, "analysis": 19_605, "laboratory": 14_205,
-    "certificate": 15_846, "artefacts": 12_483, "app": 17_505,
+    "certificate": 15_846, "artefacts": 12_483, "app": 17_388,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
-OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1491
+OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1486
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
     "arviz", "asn1crypto", "asyncio", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",

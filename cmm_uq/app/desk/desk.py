@@ -83,8 +83,7 @@ class Desk(DeskFolder):
             raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the desk is not open yet"))
         if not (request.path + "/").startswith(DESK + "/"):
             return self.records.respond(request)
-        found: Answer = routed(request, self._pages(), self._forms())(request)
-        return found
+        return routed(request, self._pages(), self._forms())(request)
 
     def foot(self, page: WebPage) -> Text:
         return say("Folder: {root}", root=Verbatim(str(self.root))) if page.place == DESK else self.records.foot(page)
@@ -101,7 +100,8 @@ class Desk(DeskFolder):
                 place = where if is_url(where) else self.root / where
                 if isinstance(place, Path) and not place.exists():
                     raise CmmUqError("no certificate is recorded here yet", fix="Make the first one on the desk")
-                self._site = records_pages()[0].Site(place)
+                site, _ = records_pages()
+                self._site = site.Site(place)
             return self._site
 
     def _pages(self) -> Mapping[str, Callable[[WebRequest], Answer]]:
@@ -305,7 +305,8 @@ class Desk(DeskFolder):
         request.only(("name",))
         one = self._state(request.text("name"))
         warnings = self.reader.ask("check", job=one.name, text=None)["warnings"]
-        diagnosed = records_pages()[1].diagnosed(one.results.get("diagnosis"))
+        _, certificates = records_pages()
+        diagnosed = certificates.diagnosed(one.results.get("diagnosis"))
         return jobs.certificate_page(one, diagnosed, self._field_of(one).is_file(), warnings)
 
     def _state(self, name: str) -> JobState:

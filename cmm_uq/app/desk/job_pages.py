@@ -238,7 +238,8 @@ def certificate_page(one: JobState, diagnosis: Any, field: bool, warnings: Itera
     """The certificate, its diagnosis, the residual field, and what to do next."""
     return p.page(
         "desk/certificate.html", DESK, one=one, outcome=p.cell_of(p.DECISIONS, one.verdicts.overall),
-        decided=list(map(_decided, one.verdicts)), diagnosis=diagnosis, field=field, next_steps=next_steps(one, warnings),
+        decided=list(map(_decided, one.verdicts)), diagnosis=diagnosis, field=field, overall=one.verdicts.overall,
+        not_stated=[text for text in warnings if "not stated" in text],
         lacking=[(_by(each), each.missing) for each in one.verdicts if each.missing],
     )  # fmt: skip
 
@@ -256,20 +257,3 @@ def _decided(one: Verdict) -> Text:
         size = say("{figure} {unit}", figure=number(figure, digits), unit=one.unit)
         told = say("{told}{lead} {size}", told=told, lead=Verbatim(lead), size=size)
     return told
-
-
-def next_steps(one: JobState, warnings: Iterable[str]) -> list[Text]:
-    steps: list[Text] = []
-    if "simulated" in Path(one.file(".html")).name:
-        steps.append(say("The readings are simulated: put in your own recording before anybody relies on it."))
-    if one.verdicts.overall in ("fail", "conditional fail"):
-        steps.append(
-            say("The machine does not conform: what the diagnosis names is to be looked at first, then measured again.")
-        )
-    if one.verdicts.overall in ("incomplete", "undecided"):
-        steps.append(say("The test is not complete or not decided: what is missing stands below."))
-    steps += [Verbatim(text) for text in warnings if "not stated" in text]
-    released = say(
-        "Release it, after somebody else has looked at it, with the command below; then the customer gets PDF and DCC."
-    )
-    return [*steps, released]

@@ -187,21 +187,19 @@ class Accounts:
             raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the request came from another site"))
         if request.path == SIGN_OUT and request.method == "POST":
             with self._lock:  # else it could come back with those that are kept when another signs in
-                self._sessions.pop(self._token(request), None)
+                self._sessions.pop(cookie_of(request, self._cookie), None)
             return self._to(ACCOUNT, f"{self._cookie}=; Max-Age=0")
         return None
 
-    def _token(self, request: WebRequest) -> str:
-        return cookie_of(request, self._cookie)
-
     def _session(self, request: WebRequest) -> SignedIn | None:
-        session = self._sessions.get(self._token(request))
+        token = cookie_of(request, self._cookie)
+        session = self._sessions.get(token)
         if (
             session is None
             or session.until < self._clock()
             or read_accounts(self._path).get(session.name) != session.account
         ):
-            self._sessions.pop(self._token(request), None)
+            self._sessions.pop(token, None)
             return None
         return session
 
@@ -252,8 +250,8 @@ class Accounts:
         return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": path, "Set-Cookie": kept})
 
     def _page(self, session: SignedIn | None, *, wrong: bool = False) -> WebPage:
-        shown = page("account.html", ACCOUNT, session=session, wrong=wrong)
-        return shown._replace(status=HTTPStatus.FORBIDDEN) if wrong else shown
+        status = HTTPStatus.FORBIDDEN if wrong else HTTPStatus.OK
+        return page("account.html", ACCOUNT, session=session, wrong=wrong)._replace(status=status)
 
 
 OPEN = "/open"

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq import __version__
 from cmm_uq.app.serve.accounts import Accounts, Guard
 from cmm_uq.app.serve.exchange import ACCOUNT, DESK, OWN, RefusedRequest, WebRequest, WebResponse, refusal
-from cmm_uq.app.serve.page import Cell, WebPage, address, shown
+from cmm_uq.app.serve.page import Cell, WebPage, address, moment, shown
 from cmm_uq.base.errors import CmmUqError, printable
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, number, say
 from cmm_uq.certificate.look import BAND, COLOURS, template_folder
 
 if TYPE_CHECKING:
@@ -30,9 +30,10 @@ OWN_FILES = {
     "/desk.js": "text/javascript; charset=utf-8", "/icon.svg": "image/svg+xml", "/style.css": "text/css; charset=utf-8",
 }  # fmt: skip
 Answer = WebPage | WebResponse
+Handler = TypeVar("Handler")
 
 
-def routed(request: WebRequest, pages: Mapping[str, Any], forms: Mapping[str, Any]) -> Any:
+def routed(request: WebRequest, pages: Mapping[str, Handler], forms: Mapping[str, Handler]) -> Handler:
     """What answers a request, of pages that are looked at and of forms that are sent."""
     if request.method == "POST" and request.path not in forms:
         raise RefusedRequest(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
@@ -120,6 +121,7 @@ def _environment() -> Environment:
     )  # fmt: skip
     environment.filters |= {"source": _source, "px": "{:.1f}".format}
     environment.globals |= {"say": say, "number": number, "verbatim": Verbatim, "address": address, "shown": shown}
+    environment.globals |= {"day": day, "moment": moment}
     environment.globals |= {"Cell": Cell, "desk_cell": Cell(say("Desk"), DESK)}
     blocks = environment.get_template("blocks.html").module.__dict__
     environment.globals |= {name: block for name, block in blocks.items() if name[0] != "_"}

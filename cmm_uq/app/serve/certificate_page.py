@@ -19,7 +19,7 @@ from cmm_uq.app.serve.exchange import MEDIA, RefusedRequest, WebRequest, WebResp
 from cmm_uq.app.serve.trends import values_table
 from cmm_uq.app.serve.view import SiteView, machine_cell
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, say
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, say
 from cmm_uq.base.output.manifest import plain_name, read_manifest
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Standing
@@ -34,24 +34,19 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
     request.only(("entry",))
     one, entry = _named(view, request)
-    folder, number = Path(one.folder), Verbatim(one.number)
+    folder = Path(one.folder)
     files = files_of(entry, folder, view.records.signed(one.entry))
-    if one.command != "report":
-        title = say("Diagnosis {number}", number=number)
-    elif one.interim:
-        title = say("Interim check {number}", number=number)
-    else:
-        title = say("Certificate {number}", number=number)
-    machine, date = Verbatim(one.machine), day(one.day)
-    lead = say("Machine {machine}, measured on {day}", machine=machine, day=date)
-    if one.origin != "measured":
-        origin = p.ORIGINS.get(one.origin, Verbatim(one.origin))
-        lead = say("Machine {machine}, {origin:small} recording of {day}", machine=machine, day=date, origin=origin)
     values = [(value.quantity, value.unit, value) for value in one.values]
     decided, standing = decided_words(one)
+    stated = Verdicts.of_results(entry.data)
     return p.page(
-        "certificate.html", "/certificates", title=title, lead=lead, machine=machine_cell(one.machine),
-        warning=p.NOT_MEASURED.get(one.origin), decided=decided, standing=standing, told=_facts(view, one, entry),
+        "certificate.html", "/certificates", one=one, entry=entry, machine=machine_cell(one.machine), decided=decided,
+        origin=None if one.origin == "measured" else p.ORIGINS.get(one.origin, Verbatim(one.origin)), standing=standing,
+        warning=p.NOT_MEASURED.get(one.origin), decision=p.cell_of(p.DECISIONS, one.decision),
+        outcomes=[(f"{each.by}, {each.name}" if each.by else each.title or each.name, p.cell_of(p.DECISIONS, each.outcome))
+                  for each in stated if len(stated) > 1 or not each.by],
+        verdict=p.cell_of(p.VERDICTS, one.diagnosis),
+        artefact="/artefacts" if any(row.serial == one.artefact for row in view.records.artefacts()) else "",
         values=values_table(say("Values as stated"), values, say("It states no value."), heard=True),
         diagnosis=diagnosed(results_of(files, folder).get("diagnosis")), signatures=_signatures(view, one),
         files=_files(one, files),
@@ -94,31 +89,6 @@ def decided_words(one: RecordedCertificate) -> tuple[Text, Standing]:
     if one.decision == "none":
         return say("{state}; it states no conformity", state=state), worse
     return say("{state}; decision: {decision:small}", state=state, decision=decision), worse
-
-
-def _facts(view: SiteView, one: RecordedCertificate, entry: Entry) -> list[tuple[Text, p.Cell]]:
-    artefact = any(row.serial == one.artefact for row in view.records.artefacts())
-    stated = Verdicts.of_results(entry.data)
-    rows: list[tuple[Text, p.Cell]] = [(say("Decision"), p.cell_of(p.DECISIONS, one.decision))]
-    for each in stated:
-        if len(stated) > 1 or not each.by:
-            title = f"{each.by}, {each.name}" if each.by else each.title or each.name
-            rows.append((Verbatim(title), p.cell_of(p.DECISIONS, each.outcome)))
-    rows += [
-        (say("Diagnosis"), p.cell_of(p.VERDICTS, one.diagnosis)),
-        (say("Machine"), machine_cell(one.machine)),
-        (say("Artefact"), p.Cell(p.shown(one.artefact), "/artefacts" if artefact else "")),
-        (say("Measurement"), p.Cell(p.shown(one.kind))),
-        (say("Job"), p.Cell(p.shown(one.job))),
-    ]
-    if one.adjusted_since is not None:
-        rows.append((say("Adjusted before, on"), p.Cell(day(one.adjusted_since))))
-    rows += [
-        (say("Recorded"), p.Cell(p.moment(one.recorded))),
-        (say("Made by"), p.Cell(say("cmm-uq {version}", version=Verbatim(one.version)) if one.version else DASH)),
-        (say("Entry of the records"), p.Cell(number(one.entry), note=Verbatim(entry.hash))),
-    ]
-    return rows
 
 
 def _signatures(view: SiteView, one: RecordedCertificate) -> p.PageTable:

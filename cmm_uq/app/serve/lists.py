@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
@@ -18,47 +18,28 @@ from cmm_uq.laboratory.records import facts
 from cmm_uq.laboratory.records.facts import ArtefactRow
 from cmm_uq.laboratory.records.listing import CertificateFilter, chosen
 
-_ANY = ("", say("Any"))
 _KEYS = ("text", "machine", "artefact", "origin", "state", "decision", "since", "until", "page")
 
 
-def _list(
-    request: WebRequest, title: Text, lead: Text, choose: Text, fields: Iterable[p.FormEntry], rows: p.PageTable, total: int,
-    *, clear: Text, kept: tuple[str, ...] = (), **further: Any,
-) -> p.WebPage:  # fmt: skip
-    """A page of a list: the form that narrows it, its rows, and where in it the reader is."""
-    given = tuple((name, request.text(name)) for name in kept if request.text(name))
-    usual = {
-        "counts": (),
-        "overdue": None,
-        "warning": None,
-        "narrowed": _narrowed(request),
-        "clear": clear,
-        "kept": given,
-    }
-    return p.page("list.html", request.path, title=title, lead=lead, choose=choose, fields=tuple(fields), rows=rows,
-                  pager=v.pager(request, total, rows.caption), **{**usual, **further})  # fmt: skip
+def _list(template: str, request: WebRequest, rows: p.PageTable, total: int, **further: Any) -> p.WebPage:
+    """A page of a list: what narrows it (``chosen``, by name), its rows, and where in it the reader is."""
+    narrowed, pager = _narrowed(request), v.pager(request, total, rows.caption)
+    return p.page(template, request.path, chosen=request.text, narrowed=narrowed, rows=rows, pager=pager, **further)
 
 
 def _narrowed(request: WebRequest) -> bool:
     return any(request.text(name) for name in request.query if name != "page")
 
 
-def _field(request: WebRequest, name: str, label: Text, *options: tuple[str, Text], usual: str = "") -> p.FormEntry:
-    """A line of text, or a choice where there are options, with what was chosen."""
-    return p.FormEntry(name, label, request.text(name) or usual, "select" if options else "search", options)
+def _options(words: Mapping[str, p.Word]) -> list[tuple[str, Text]]:
+    return [(name, text) for name, (text, _) in words.items()]
 
 
-def _options(words: Mapping[str, p.Word]) -> tuple[tuple[str, Text], ...]:
-    return tuple((name, text) for name, (text, _) in words.items())
-
-
-def _dates(request: WebRequest) -> tuple[dt.date | None, dt.date | None, tuple[p.FormEntry, ...]]:
+def _days(request: WebRequest) -> tuple[dt.date | None, dt.date | None]:
     since, until = request.day("since"), request.day("until")
     if since is not None and until is not None and since > until:
         raise bad(say("the list would end before it begins"), say("Exchange the two dates"))
-    ends = (("since", say("From")), ("until", say("To")))
-    return since, until, tuple(p.FormEntry(name, label, request.text(name), "date") for name, label in ends)
+    return since, until
 
 
 def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
@@ -67,30 +48,18 @@ def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     origin = request.one_of("origin", tuple(p.ORIGINS)) or "measured"
     state = request.one_of("state", facts.STATES)
     decision = request.one_of("decision", tuple(p.DECISIONS))
-    since, until, dates = _dates(request)
+    since, until = _days(request)
     choice = CertificateFilter(
         text=text, machine=machine, artefact=artefact, origin=origin, states=(state,) if state else (),
         decisions=(decision,) if decision else (), since=since, until=until,
     )  # fmt: skip
     rows, total = v.paged(view.records, choice, request)
     count = plural(total, one=say("1 certificate"), many=say("{count} certificates", count=number(total, ",d")))
-    fields = (
-        _field(request, "text", say("Number, job or machine")),
-        _field(request, "state", say("State"), _ANY, *_options(p.STATES)),
-        _field(request, "decision", say("Decision"), _ANY, *_options(p.DECISIONS)),
-        _field(request, "origin", say("Recording"), *p.ORIGINS.items(), usual=origin),
-        *dates,
-    )
     none = say("No certificate of a measurement is recorded yet.")
-    lead = say("Newest first.")
-    if machine:
-        lead = say("Of machine {serial}, newest first.", serial=Verbatim(machine))
-    elif artefact:
-        lead = say("Made with artefact {serial}, newest first.", serial=Verbatim(artefact))
+    table = v.certificates_table(rows, count, say("No certificate is as chosen.") if _narrowed(request) else none)
     return _list(
-        request, say("Certificates"), lead, say("Choose certificates"), fields,
-        v.certificates_table(rows, count, say("No certificate is as chosen.") if _narrowed(request) else none), total,
-        clear=say("Show all"), warning=p.NOT_MEASURED.get(origin), kept=("machine", "artefact"),
+        "certificates.html", request, table, total, origin=origin, warning=p.NOT_MEASURED.get(origin),
+        states=_options(p.STATES), decisions=_options(p.DECISIONS), origins=p.ORIGINS.items(),
     )  # fmt: skip
 
 
@@ -99,7 +68,7 @@ def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     request.only(("text", "verdict", "since", "until", "page"))
     verdict = request.one_of("verdict", (*p.VERDICTS, "all"))
     verdicts = {"": DIAGNOSES[1:], "all": tuple(p.VERDICTS)}.get(verdict, (verdict,))
-    since, until, dates = _dates(request)
+    since, until = _days(request)
     choice = CertificateFilter(text=request.text("text"), command="", verdicts=verdicts, since=since, until=until)
     rows, total = v.paged(view.records, choice, request)
     count = plural(total, one=say("1 recording"), many=say("{count} recordings", count=number(total, ",d")))
@@ -112,14 +81,8 @@ def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     headings = p.columns(
         say("Certificate or diagnosis"), say("Verdict"), say("Machine"), (say("Measured on"), "day"), say("State")
     )
-    options = (("", say("Not consistent")), *_options(p.VERDICTS), ("all", say("All")))
-    fields = (_field(request, "text", say("Number, job or machine")),
-              _field(request, "verdict", say("Verdict"), *options), *dates)  # fmt: skip
-    lead = say("Measured recordings that contradict the model of their machine, newest first.")
-    return _list(
-        request, say("Diagnoses"), NOTHING if verdict else lead, say("Choose diagnoses"), fields,
-        p.PageTable(count, headings, cells, say("There is none.")), total, clear=say("Show what is not consistent"),
-    )  # fmt: skip
+    table = p.PageTable(count, headings, cells, say("There is none."))
+    return _list("diagnoses.html", request, table, total, verdicts=_options(p.VERDICTS))
 
 
 ARTEFACT_COLUMNS = p.columns(
@@ -143,12 +106,8 @@ def artefacts_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         for one in v.on_page(found, request)
     )  # fmt: skip
     empty = say("No artefact is as chosen.") if known else say("No artefact is recorded yet.")
-    fields = (_field(request, "text", say("Serial, certificate or laboratory")),) if known else ()
-    return _list(
-        request, say("Artefacts"),
-        say("On {day}, first what is out of date: no certificate can rest on that.", day=day(view.today)),
-        say("Choose artefacts"), fields, p.PageTable(count, ARTEFACT_COLUMNS, rows, empty), len(found), clear=say("Show all"),
-    )  # fmt: skip
+    table = p.PageTable(count, ARTEFACT_COLUMNS, rows, empty)
+    return _list("artefacts.html", request, table, len(found), today=day(view.today), known=known)
 
 
 def _state(one: ArtefactRow, today: dt.date) -> p.Cell:
@@ -188,15 +147,10 @@ def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     count = plural(len(found), one=say("1 machine"), many=say("{count} machines", count=number(len(found), ",d")))
     empty = say("No machine is as chosen.") if machines else say("No machine is recorded yet.")
     places = sorted({one.newest.machine.place for one in machines} - {""})
-    states = tuple((name, group.word) for name, group in v.GROUPS.items())
-    fields = [_field(request, "text", say("Serial, name, model or place")),
-              _field(request, "state", say("State"), _ANY, *states)]  # fmt: skip
-    if 1 < len(places) <= MOST_PLACES:
-        fields.append(_field(request, "place", say("Place"), _ANY, *((one, Verbatim(one)) for one in places)))
     return _list(
-        request, say("Machines"), say("On {day}, the most urgent first.", day=day(view.today)), say("Choose machines"), fields,
-        p.PageTable(count, COLUMNS, rows, empty), len(found), clear=say("Show all"),
-        counts=tally, overdue=_overdue_artefacts(view),
+        "machines.html", request, p.PageTable(count, COLUMNS, rows, empty), len(found), today=day(view.today), counts=tally,
+        overdue=_overdue_artefacts(view), states=[(name, group.word) for name, group in v.GROUPS.items()],
+        places=[(one, Verbatim(one)) for one in places] if 1 < len(places) <= MOST_PLACES else [],
     )  # fmt: skip
 
 
@@ -255,23 +209,16 @@ def machine_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     except CmmUqError as error:
         raise RefusedRequest(HTTPStatus.NOT_FOUND, *v.problem_of(error)) from None
     standing = next((one for one in view.standing() if one.serial == machine.serial), None)
-    facts = [
-        (say("Manufacturer"), p.Cell(p.shown(machine.manufacturer))),
-        (say("Model"), p.Cell(p.shown(machine.model))),
-        (say("Place"), p.Cell(p.shown(machine.place))),
-    ]
-    if machine.adjusted:
-        facts.append((say("Adjusted on"), p.Cell(commas(day(one) for one in machine.adjusted))))
-    if standing is not None:
-        facts.append((say("Due"), due_cell(standing)))
-        if (newest := standing.newest.certificate) is not None:
-            facts.append((say("Newest certificate"), v.certificate_cell(newest)))
+    newest = None if standing is None else standing.newest.certificate
     listed, count = chosen(view.records, CertificateFilter(machine=machine.serial), LISTED)
     caption = say("The newest {shown} of {count}", shown=number(len(listed)), count=number(count, ",d"))
     table = v.certificates_table(listed, caption, say("No measured certificate is recorded."), machine=False)
     charts, once = trends(view.records, machine)
     return p.page(
-        "machine.html", "/", machine=machine, told=facts, charts=charts, once=once, certificates=table,
+        "machine.html", "/", machine=machine, charts=charts, once=once, certificates=table,
+        due=None if standing is None else due_cell(standing),
+        newest=None if newest is None else v.certificate_cell(newest),
+        adjusted=commas(day(one) for one in machine.adjusted),
         words=[] if standing is None else [_group_words(standing, name) for name in standing.groups],
         standing=None if standing is None else v.GROUPS[standing.groups[0]].standing,
     )  # fmt: skip

@@ -66,16 +66,6 @@ class PageTable(NamedTuple):
     heard: bool = False
 
 
-class FormEntry(NamedTuple):
-    """A field of a form that narrows a list: a line of text, a date, or one of several options ``(value, text)``."""
-
-    name: str
-    label: Text
-    value: str = ""
-    sort: Literal["search", "date", "select"] = "search"
-    options: tuple[tuple[str, Text], ...] = ()
-
-
 class WebPage(NamedTuple):
     """What a reader gets: a template with its values, under an entry (``place``) of the contents."""
 

@@ -29,7 +29,7 @@ from cmm_uq.app.serve.certificate_page import certificate_page, files_of, record
 from cmm_uq.app.serve.exchange import LARGEST, RefusedRequest, UploadedFile, WebRequest, WebResponse, read_dropped, to
 from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, number, plural, say
+from cmm_uq.base.messages import Text, Verbatim, number, plural, say
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import RecordedCertificate
@@ -104,17 +104,9 @@ def dropped_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     request.only(())
     dropped = read_dropped(request)
     known = look_up(view.records, dropped)
-    rows: list[tuple[Text, p.Cell]] = []
-    if (one := known.certificate) is not None:
-        name = say("recorded as {name}", name=Verbatim(known.name)) if known.name else NOTHING
-        rows = [
-            (say("Certificate"), p.Cell(Verbatim(one.number), p.address("/certificate", entry=one.entry), note=name)),
-            (say("Machine"), v.machine_cell(one.machine)),
-            (say("Measured on"), p.Cell(day(one.day))),
-        ]
-    size = say("{bytes} bytes", bytes=number(dropped.size, ",d"))
-    rows += [(say("Size"), p.Cell(size)), (say("SHA-256"), p.Cell(Verbatim(dropped.sha256)))]
-    return p.page("file.html", "/file", dropped=dropped, most=LARGEST // 2**20, verdict=verdict(known), told=rows)
+    machine = None if known.certificate is None else v.machine_cell(known.certificate.machine)
+    return p.page("file.html", "/file", dropped=dropped, most=LARGEST // 2**20, verdict=verdict(known), known=known,
+                  one=known.certificate, machine=machine)  # fmt: skip
 
 
 def verdict(known: FileMatch) -> CheckVerdict:
@@ -237,8 +229,7 @@ class Site(Application):
             with self.opened() as records:
                 today = self._today()
                 view = v.SiteView(records, today, lambda: self._standing(records, today), self.checking)
-                found: Answer = page(view, request)
-                return found
+                return page(view, request)
         except CmmUqError as error:
             title = say("The records cannot be read")
             raise RefusedRequest(HTTPStatus.SERVICE_UNAVAILABLE, *v.problem_of(error), title) from None
