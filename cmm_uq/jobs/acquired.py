@@ -43,31 +43,25 @@ class Instrument(ResultsPart):
 
     @property
     def sentence(self) -> Text:
+        """What it said itself, and in which units it is taken to send its quantities, by whose word."""
         parts: list[Text] = names(filter(None, (self.name, " ".join(filter(None, (self.maker, self.model))))))
         if self.serial:
             parts.append(say("serial number {serial}", serial=Verbatim(self.serial)))
         if self.firmware:
             parts.append(say("firmware {firmware}", firmware=Verbatim(self.firmware)))
         number = self.certificate
-        stated = say("certificate {number}", number=Verbatim(number)) if number else say("no certificate stated")
-        return commas([*parts, stated, *self._units, *self._unasked])
-
-    @property
-    def _units(self) -> list[Text]:
-        """In which units it is taken to send its quantities, and who says so."""
-        told: list[Text] = []
+        parts.append(say("certificate {number}", number=Verbatim(number)) if number else say("no certificate stated"))
         for unit in dict.fromkeys(self.units.values()):
             of = [name for name, given in self.units.items() if given == unit]
             shown, stated = Verbatim(unit), [name for name in of if name in self.units_stated]
-            told += [say("{names} in {unit} as stated", names=commas(names(stated)), unit=shown)] if stated else []
+            if stated:
+                parts.append(say("{names} in {unit} as stated", names=commas(names(stated)), unit=shown))
             if assumed := [name for name in of if name not in stated]:
-                told.append(say("{names} in {unit} as assumed", names=commas(names(assumed)), unit=shown))
-        return told
-
-    @property
-    def _unasked(self) -> list[Text]:
-        many = say("{count} answers to no question, not used", count=self.unasked)
-        return [plural(self.unasked, one=say("1 answer to no question, not used"), many=many)] if self.unasked else []
+                parts.append(say("{names} in {unit} as assumed", names=commas(names(assumed)), unit=shown))
+        if self.unasked:
+            many = say("{count} answers to no question, not used", count=self.unasked)
+            parts.append(plural(self.unasked, one=say("1 answer to no question, not used"), many=many))
+        return commas(parts)
 
 
 class Silence(ResultsPart):

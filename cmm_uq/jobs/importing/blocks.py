@@ -87,7 +87,7 @@ class Block:
 
     paths: list[list[str]]
     rows: list[int] = field(default_factory=list)  # indices in the sheet
-    titles: list[dict[str, str]] = field(default_factory=list)  # of each row
+    titles: dict[int, dict[str, str]] = field(default_factory=dict)  # of each row
     above: list[int] = field(default_factory=list)  # rows of text and of other figures since the block before
     number: int = 0
     head: list[int] = field(default_factory=list)
@@ -105,6 +105,7 @@ class CutSheet:
         self._targets: dict[int, list[int]] = {}
         self.places_of: dict[int, str] = {}  # of each row of figures, as LINE_PLACE has it
         self.blocks = self._titled(list(self._blocks()))
+        self.block_of = {row: block for block in self.blocks for row in block.rows}
         for block in self.blocks:
             self.places_of |= self._places_beside(block)
 
@@ -164,11 +165,7 @@ class CutSheet:
 
     def path(self, row: int, i: int) -> list[str]:
         """Texts above a cell."""
-        return next((block.paths[i] for block in self.blocks if row in block.rows), [])
-
-    def of_block(self, row: int) -> list[int]:
-        """Rows of the block that a row is in."""
-        return next((block.rows for block in self.blocks if row in block.rows), [])
+        return self.block_of[row].paths[i] if row in self.block_of else []
 
     def _is_head(self, i: int) -> bool:
         """Whether a row with figures counts columns, as ``1 2 3 1 2 3``."""
@@ -247,7 +244,7 @@ class CutSheet:
                 block = Block(self._paths(head), number=1 if block is None else block.number + 1, head=head)
             block.above += above
             block.rows.append(i)
-            block.titles.append(titles)
+            block.titles[i] = titles
             place = {name: xyz for row in block.above for name, xyz in self.place(row).items()}
             if "start" in place and len(place) > 1:
                 other = "end" if "end" in place else "direction"
@@ -267,7 +264,7 @@ class CutSheet:
             kept = next((n for n, own in enumerate(rows) if len(own) == len(same) > 1), deep)
             for block in same if kept < deep else ():
                 titles = {key: text for row in block.head[:-kept] for key, text in self._titles(row).items()}
-                block.titles = [{**own, **titles} for own in block.titles]
+                block.titles = {row: {**own, **titles} for row, own in block.titles.items()}
                 block.head = block.head[-kept:]
                 block.paths = self._paths(block.head)
         return blocks

@@ -79,8 +79,9 @@ def _without_mark(content: bytes) -> str:
     return "cp1252" if not any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else "latin-1"
 
 
-def report_lines(text: str, where: str) -> list[str]:
-    """Lines of a report, none of them longer than a report's can be."""
+def report_lines(content: bytes, where: str, asked: str | None = None) -> tuple[list[str], str]:
+    """Lines of a report, none of them longer than a report's can be, and what its encoding is called."""
+    text, title = decoded(content, where, asked)
     lines = text.splitlines()
     if len(lines) > LINES.most:
         raise CmmUqError(f"has {len(lines)} lines, {LINES.most} are the most", where=where, fix="Split the report")
@@ -88,7 +89,7 @@ def report_lines(text: str, where: str) -> list[str]:
     if longest > _REPORT_LINE:
         problem = f"the line has {longest} characters, {_REPORT_LINE} are the most in a report"
         raise CmmUqError(problem, where=f"{where} line {-line}", fix="Export it again as text")
-    return lines
+    return lines, title
 
 
 def head_text(head: bytes) -> str:

@@ -178,7 +178,7 @@ def header_of(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Seque
     for row, cells in enumerate(sheet.rows[:LINES_BEFORE]):
         if len(cells) < 2 and not keys.columns:
             continue
-        headings = [cell if isinstance(cell, str) else f"{cell:g}" for cell in cells]
+        headings = [*map(text_of, cells)]
         found = assigned(headings, named)
         if found is not None and any(set(columns) <= set(found) for columns in wanted):
             points = len({index for index, _ in found.get("x_mm", ())} - {None})

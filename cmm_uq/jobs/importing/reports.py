@@ -12,7 +12,7 @@ from itertools import islice
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LINE, ROWS
 from cmm_uq.base.messages import Text, Verbatim, number, say
-from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
+from cmm_uq.jobs.importing.encodings import head_text, report_lines
 from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, NotReadError, Row, Sheet, sheets_of
 
 AXES = ("X", "Y", "Z")
@@ -31,8 +31,7 @@ class TextReport(Format):
         return all(pattern.search(text) for pattern in self.shows)
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        text, encoding = decoded(content, where, keys.encoding)
-        lines = report_lines(text, where)
+        lines, encoding = report_lines(content, where, keys.encoding)
         return self.sheets(lines, where, keys, Fact("encoding", say("Encoding"), Verbatim(encoding)))
 
     @abstractmethod

@@ -254,9 +254,8 @@ def _heads_of(column: FigureColumn, beside: Sequence[FigureColumn]) -> Labels:
 
 def _beside(grid: CutSheet, rows: Sequence[int], used: set[int]) -> list[Labels]:
     """Names and numbers that stand beside rows, and titles above them."""
-    of_row = {row: (block, n) for block in grid.blocks for n, row in enumerate(block.rows)}
     out: list[Labels] = [{} for _ in rows]
-    paths = of_row[rows[0]][0].paths
+    paths = grid.block_of[rows[0]].paths
     for i in sorted({*range(len(paths))} - used):
         cells = [grid.text(row, i) for row in rows]
         said_to_be = grid.named(i, paths[i])
@@ -271,8 +270,8 @@ def _beside(grid: CutSheet, rows: Sequence[int], used: set[int]) -> list[Labels]
         for labels, cell in zip(out, cells, strict=True):
             labels["column", f"{i} {name}"] = last = cell or last
     for labels, row in zip(out, rows, strict=True):
-        block, n = of_row[row]
-        labels |= {("title", first): text for first, text in block.titles[n].items()}
+        block = grid.block_of[row]
+        labels |= {("title", first): text for first, text in block.titles[row].items()}
         labels["block", ""] = f"{block.number}"
     return out
 
@@ -340,7 +339,7 @@ def _explained(
     grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[int], columns: Collection[int]
 ) -> bool:
     """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
-    cells, block = grid.sheet.rows[row], grid.of_block(row)
+    cells, block = grid.sheet.rows[row], grid.block_of[row].rows
     if header.is_summary(cells) or is_void(cells, "void", "feature"):
         return True
     if said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary":

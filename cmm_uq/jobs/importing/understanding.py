@@ -239,7 +239,7 @@ class Understanding:
     def header(self) -> Header:
         """Head of the first block that is read, and which of its columns are taken."""
         row = self.reading.rows[0]
-        block = next(block for block in self.grid.blocks if row in block.rows)
+        block = self.grid.block_of[row]
         taken = {name: tuple(c.i for c in own if c.i >= 0) for name, own in self.reading.taken.items()}
         first = block.head[-1] if block.head else row
         return Header(first, block.rows[0], [heading(path) for path in block.paths], taken)

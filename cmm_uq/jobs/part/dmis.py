@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.encodings import decoded, report_lines
+from cmm_uq.jobs.importing.encodings import report_lines
 from cmm_uq.jobs.importing.reports import statements
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN
@@ -104,8 +104,7 @@ _UNLABELLED = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
 
 
 def drawing_of_dmis(content: bytes, where: str) -> Drawing:
-    text, _ = decoded(content, where, None)
-    said = statements(report_lines(text, where), where)
+    said = statements(report_lines(content, where)[0], where)
     return _Program(where).whole([(line, statement.partition("$$")[0].strip()) for line, statement in said])
 
 

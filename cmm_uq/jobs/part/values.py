@@ -20,7 +20,7 @@ from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.importing.documents import child, three
-from cmm_uq.jobs.importing.encodings import begins_with, decoded, local, report_lines, root_of
+from cmm_uq.jobs.importing.encodings import begins_with, local, report_lines, root_of
 from cmm_uq.jobs.importing.format import HEAD, length_named
 from cmm_uq.jobs.importing.pcdmis import Dimension, PcDmis, dimensions, figure_of, step_of
 from cmm_uq.jobs.importing.reports import ACTUAL, DMIS_UNIT, Dmis, one_unit, statements
@@ -153,7 +153,7 @@ def _read(content: bytes, where: str) -> _Contents:
         return _of_qif(content, where)
     for known, read in ((PcDmis(), _of_pcdmis), (Dmis(), _of_dmis)):
         if known.recognises(head):
-            return read(report_lines(decoded(content, where)[0], where), where)
+            return read(report_lines(content, where)[0], where)
     return _of_csv(content, where)
 
 

@@ -193,8 +193,7 @@ class RotaryTableFacts(JobTable):
     the carriages."""
     turns: Literal["anticlockwise", "clockwise"] = "anticlockwise"
     """How the table turns while its reading grows, seen from the positive end of the axis that it is parallel to."""
-    travel_deg: Range | None = None
-    """Lowest and highest reading of the table."""
+    travel_deg: Range | None = key(None, "Lowest and highest reading of the table.")
 
     def problems(self) -> Iterator[str]:
         if self.coordinates == "machine" and self.axis_mm is None:
