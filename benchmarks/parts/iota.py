@@ -26,6 +26,7 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.maths.uncertainty.propagation import simulate
 from tests.parts_drawn import spot
 
 COMPENSATED = ROOT / "examples" / "iota-1102-20C-compensated"
@@ -90,7 +91,7 @@ def left_out() -> dict[str, np.ndarray]:
         )
         seen = float(np.linalg.norm(points.xyz[rows[1]] - points.xyz[rows[0]]) - np.linalg.norm(other - one))
         for name, state in zip(found, (alone, given_recording(with_curves(certificate), model)), strict=True):
-            simulated = Virtual(plan, MeasurementConditions(state)).simulated(10_000)
+            simulated = simulate(Virtual(plan, MeasurementConditions(state)).source, 10_000)
             found[name].append((seen - float(simulated.value[0]), float(simulated.u[0])))
     return {name: np.array(pairs) for name, pairs in found.items()}
 

@@ -22,6 +22,7 @@ from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.points import Floats
+from cmm_uq.maths.uncertainty.propagation import simulate, simulate_adaptively
 from tests.parts_drawn import POSE, block, circle, machine, plane
 
 NAMES = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]
@@ -117,8 +118,8 @@ def known(virtual: Virtual) -> None:
     """How well u is known: by two independent runs as long as the digits that are asked for need, and of 10⁶."""
     for digits in (1, 2):
         with told(f"as many as {digits} digits of u need (JCGM 101, 7.9)"):
-            one = virtual.settled(digits=digits, seed=1)
-        other = virtual.settled(digits=digits, seed=2)
+            one = simulate_adaptively(virtual.source, digits=digits, seed=1, fewest_trials=100_000)
+        other = simulate_adaptively(virtual.source, digits=digits, seed=2, fewest_trials=100_000)
         print(
             f"  {one.trials} virtual measurements, u of two runs differs by {100 * np.max(np.abs(one.u / other.u - 1)):.2f} %"
         )
@@ -132,12 +133,12 @@ def main() -> None:
     print(f"{len(plan.points)} points, {len(characteristics)} characteristics, {coefficients} coefficients")
     print(f"first order is off by {100 * virtual.off.max():.2f} % of u")
     with told("10⁶ virtual measurements"):
-        virtual.simulated(1_000_000)
+        simulate(virtual.source, 1_000_000)
     memory()
     known(virtual)
     virtual.exact = True
     with told("10⁵ of them with every feature on its points"):
-        virtual.simulated(100_000)
+        simulate(virtual.source, 100_000)
     flat = Plan(
         (plane("A", [0, 0, 1], [0, 0, 0], [[200, 0, 0], [0, 100, 0]], (10, 10)), circle("c", [100, 50, 0], 20.0, 100)),
         (PartCharacteristic("flat", "flatness", ("A",), association="minimum_zone"),
@@ -146,7 +147,7 @@ def main() -> None:
     )  # fmt: skip
     zones = Virtual(flat, circumstances())
     with told("10⁴ flatnesses and roundnesses of 100 points by minimum zone"):
-        zones.simulated(10_000)
+        simulate(zones.source, 10_000)
     memory()
     peers(plan)
 

@@ -21,7 +21,7 @@ from itertools import product
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause, Rows
+from cmm_uq.analysis.parts.causes.cause import LARGE, Drawn, PartCause, Rows
 from cmm_uq.analysis.parts.causes.machine import MACHINE, NOISE, STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, FORM, OPERATOR, ROUNDING, TEMPERATURE
 from cmm_uq.analysis.parts.plan import PartPose, Plan
@@ -33,7 +33,7 @@ from cmm_uq.jobs.part.feature import Kind
 
 DRAWS = 2**13  # of each of the two samples; shares are then known to about one in a hundred
 PLACE = "place on the table"
-POINT_DRAWS = 2_000  # A standard deviation is then known to two percent
+POINT_DRAWS = 2_000  # A standard deviation is then known to two percent; of thousands of points to three
 _BLOCK = 300_000  # coordinates drawn at once
 _NEGLIGIBLE = 1e-9  # of the largest, a singular value of rigid motions that points do not tell from others
 WAY_DRAWS = 10_000  # of each way; u is then known to 0.7 %.
@@ -238,6 +238,7 @@ def point_errors(virtual: Virtual, draws: int = POINT_DRAWS, seed: int = 0) -> P
     points, random = virtual.plan.points, np.random.default_rng(seed)
     n = len(points)
     rigid = _rigid(points)
+    draws = max(draws // 4, min(draws, draws * LARGE // max(n, 1)))
     block = max(1, min(draws, _BLOCK // (3 * n)))
     each = max(1, -(-draws // len(virtual.whole)))
     total, first, second = 0, np.zeros((n, 3)), np.zeros((n, 3, 3))
@@ -311,7 +312,7 @@ def ways(
     found = [Way(say("as planned"), spread(first, draws, seed), draws)]
     for name, change in _changes(plan, given, doubled):
         with suppress(CmmUqError):  # beyond the travel
-            found.append(Way(name, spread(Virtual(*change(), first.known, _PILOT), draws, seed), draws))
+            found.append(Way(name, spread(Virtual(*change(), pilot=_PILOT, first=first), draws, seed), draws))
     with suppress(CmmUqError):
         found += _elsewhere(plan, given, first, draws, seed)
     return found + _means(plan, given, first, draws, seed)
@@ -368,20 +369,36 @@ def _elsewhere(plan: Plan, given: MeasurementConditions, first: Virtual, draws: 
         return []
     read = first.places[0].points.carriages
     room = np.stack([travel[:2, 0] - read[:, :2].min(axis=0), travel[:2, 1] - read[:, :2].max(axis=0)])  # (2, axes)
-    planned, best = _quick(first.places[0], seed), (1.0, given, np.zeros(2))
+    few, near = _thinned(plan, given)
+    place = first.places[0] if few is plan else AtPose(few, near, given.poses[0], first.known).condensed()
+    planned, best = _quick(place, seed), (1.0, given, np.zeros(2))
     for part in product((0.0, 0.5, 1.0), repeat=2):
         shift = room[0] + np.array(part) * (room[1] - room[0])
         moved = tuple(replace(p, translation_mm=p.translation_mm + np.append(shift, 0.0)) for p in given.poses)
         there = replace(given, poses=moved)
         with suppress(CmmUqError):
-            u = _quick(AtPose(plan, there, moved[0], first.known).condensed(), seed)
+            u = _quick(AtPose(few, replace(near, poses=moved), moved[0], first.known).condensed(), seed)
             ratio = float(np.mean(u / np.maximum(planned, np.finfo(np.float64).tiny)))
             best = (ratio, there, shift) if ratio < best[0] else best
     if best[1] is given:
         return []
     x, y = (signed(float(mm), "+.0f") for mm in best[2])
     name = say("part moved by {x} mm along {a} and {y} mm along {b}", x=x, y=y, a=Verbatim("X"), b=Verbatim("Y"))
-    return [Way(name, spread(Virtual(plan, best[1], first.known, _PILOT), draws, seed), draws)]
+    return [Way(name, spread(Virtual(plan, best[1], pilot=_PILOT, first=first), draws, seed), draws)]
+
+
+def _thinned(plan: Plan, given: MeasurementConditions) -> tuple[Plan, MeasurementConditions]:
+    """The plan with some points for all of those of large features, by which places are compared; itself where it has none."""
+    steps = {name: max(1, (rows.stop - rows.start) // LARGE) for name, rows in plan.rows.items()}
+    if max(steps.values()) == 1 or given.further:
+        return plan, given
+    kept = {name: np.arange(of.start, of.stop, steps[name]) for name, of in plan.rows.items()}
+    rows, points, normals = np.concatenate(list(kept.values())), plan.points, plan.normals
+    features = tuple(replace(f, points=points[kept[f.name]], normals=normals[kept[f.name]]) for f in plan.features)
+    order, times = plan.order[np.isin(plan.order, rows)], plan.times_s
+    times = times[rows] if len(times) else times
+    few = replace(plan, features=features, order=np.searchsorted(rows, order), times_s=times)
+    return few, replace(given, measured=None if given.measured is None else given.measured[rows])
 
 
 def _quick(place: AtPose, seed: int) -> Floats:

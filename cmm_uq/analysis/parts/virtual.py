@@ -9,7 +9,7 @@ inferred from what was measured by turning the measurement round (:mod:`cmm_uq.a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ import numpy as np
 
 from cmm_uq.analysis.machine.performance import PriorInfluence, influence_of
 from cmm_uq.analysis.machine.state import MachineState
-from cmm_uq.analysis.parts.causes.cause import LARGE, CommonCause, Drawn, PartCause, condensed, normal
+from cmm_uq.analysis.parts.causes.cause import LARGE, CommonCause, Drawn, PartCause, condensed, normal, together
 from cmm_uq.analysis.parts.causes.machine import MACHINE, Qualified, modelled, noise, not_modelled, styli
 from cmm_uq.analysis.parts.causes.surroundings import (
     Reproducibility,
@@ -37,10 +37,9 @@ from cmm_uq.analysis.parts.result import Inverse, alike, inverse, nodes_of, tria
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.field import family_of
-from cmm_uq.maths.uncertainty.propagation import Simulated, Source, simulate, simulate_adaptively
+from cmm_uq.maths.uncertainty.propagation import Source
 
 CHECKED = 200  # draws that are looked at exactly, beside first order
-FEWEST = 100_000  # virtual measurements, after which u is known to a quarter of a percent
 ROUNDING = 1e-9  # mm and rad: a spread below which is none
 THREADED = 2_000  # draws of a block that are worth a thread
 AGREES = 0.01  # of u, by which first order may be off before all is taken exactly: what u is good for
@@ -56,6 +55,8 @@ _KEPT = 1_600_000
 _PILOT_SEED = 20_101  # of these, in every place alike, so that places are compared by the same
 # movements of a block of the pilot, and what adds to its characteristics, the same each time
 _PilotBlock = Callable[[], tuple[Movement, Floats]]
+# what was modelled of a machine, its mean errors at the points, what was not modelled, and columns that this lacks
+_OfMachine = tuple[CommonCause, Floats, list[PartCause], dict[str, str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,29 +77,33 @@ class AtPose:
 
     ``given``: its circumstances. ``pose``: the place. ``known``: features that were looked at in another place
     (:class:`Evaluator`). ``pilot``: draws by which the measurement of what is never negative is turned round; fewer, a
-    quarter at least, of a plan of thousands of points. ``base``: (n, 3) by how much points are displaced without any draw,
-    mm. ``still``: (c,) characteristics of the part: as measured, less ``base``, or of the nominal one.
+    quarter at least, of a plan of thousands of points. ``like``: the same part in the same place, measured otherwise.
+    ``base``: (n, 3) by how much points are displaced without any draw, mm. ``still``: (c,) characteristics of the part: as
+    measured, less ``base``, or of the nominal one.
     """
 
     def __init__(
-        self, plan: Plan, given: MeasurementConditions, pose: PartPose, known: Known | None = None, pilot: int = PILOT
-    ) -> None:
+        self, plan: Plan, given: MeasurementConditions, pose: PartPose, known: Known | None = None, pilot: int = PILOT,
+        like: AtPose | None = None,
+    ) -> None:  # fmt: skip
         surroundings = given.surroundings.since(given.machine.temperature_c)
         self.points = points = placed(plan, pose, given.machine.machine, surroundings.columns)
         qualified = Qualified.on(plan, points, given.machine.machine)
-        unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
         own, on_surface = forms(given.forms, plan)
-        beside = None if given.measured is None else given.measured - plan.points
-        machine, self.base = modelled(given.machine, qualified, pose, beside)
+        beside, of = None if given.measured is None else given.measured - plan.points, (given.machine, qualified, pose)
+        same = like is not None and np.array_equal(like.points.carriages, points.carriages)
+        self.of_machine: _OfMachine = like.of_machine if like and same else (*modelled(*of, beside), *not_modelled(*of))
+        machine, base, unmodelled, self.lacking = self.of_machine
         first = int(plan.order[0]) if len(plan.order) else 0
         readings = noise(given.machine, points, pose, given.repeats, first)
         warm = temperatures(surroundings, plan, points, pose)
         self.causes: list[PartCause] = [
             machine, *unmodelled, *readings, *styli(plan, pose), *warm, *given.further, *own,
         ]  # fmt: skip
-        self.base += mean_expansion(surroundings, plan, points, pose)
+        self.base = base + mean_expansion(surroundings, plan, points, pose)
         self.pilot = max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
         self._inverses = dict[bool, dict[int, Inverse]]()
+        self.summed: AtPose | None = None  # the same errors by fewer causes, where nobody asks which cause they are of
         drawn = any(len(feature.surface) for feature in plan.features)
         self.true: Evaluator | None = None
         if drawn or given.measured is None:
@@ -129,11 +134,19 @@ class AtPose:
         if not large:
             return self
         on_points, derivative = evaluator.on_points(), evaluator.derivative()
-        found = copy(self)
-        found.causes = [condensed(cause, plan, on_points, derivative) for cause in self.causes]
-        beside = evaluator.causes[len(self.causes) :]
-        found.measured = Evaluator(plan, evaluator.base, [*found.causes, *beside], self._known, large & set(on_points))
+        fewer = [condensed(cause, plan, on_points, derivative) for cause in self.causes]
+        found = self._by(fewer, large & set(on_points))
         found._inverses = {}
+        if self.true is None:
+            found.summed = found._by(together(fewer), found.measured.along)
+        return found
+
+    def _by(self, causes: list[PartCause], along: Collection[str]) -> AtPose:
+        """The same by other causes."""
+        found, evaluator = copy(self), self.measured
+        found.causes = causes
+        beside = evaluator.causes[len(self.causes) :]
+        found.measured = Evaluator(evaluator.plan, evaluator.base, [*causes, *beside], self._known, along)
         return found
 
     def drawn(self, random: np.random.Generator, n: int) -> list[Drawn]:
@@ -184,22 +197,16 @@ class AtPose:
     def inverses(self, *, exact: bool) -> dict[int, Inverse]:
         """By place of what is never negative, the map from what is read to what is true; made once for all draws."""
         if exact not in self._inverses:
-            self._inverses[exact] = self._inverted(exact=exact) if self.inferred else {}
+            self._inverses[exact] = (self.summed or self)._inverted(exact=exact) if self.inferred else {}
         return self._inverses[exact]
 
     def _inverted(self, *, exact: bool) -> dict[int, Inverse]:
         """Of trial parts with zones of several widths, which may be what was measured with other errors (:func:`.alike`)."""
         perfect = self.measured.movement([*[None] * len(self.causes), -np.ones((1, 1))], exact=exact)
-        blocks, of = self._pilot_blocks(exact=exact), self.measured.of
-        again, alone = (
-            np.concatenate(
-                [
-                    of(moved.plus(more) if more else moved, exact=exact) + beside
-                    for moved, beside in (make() for make in blocks)
-                ]
-            )
-            for more in (None, perfect)
-        )
+        blocks = self._pilot_blocks(exact=exact)
+        pairs = [[self.measured.of(one, exact=exact) + beside for one in (moved, moved.plus(perfect))]
+                 for moved, beside in (make() for make in blocks)]  # fmt: skip
+        again, alone = (np.concatenate(each) for each in zip(*pairs, strict=True))
         inferred = [i for i in self.inferred if np.ptp(alone[:, i]) > ROUNDING]
         nodes = {i: nodes_of(float(self.still[i]), alone[:, i]) for i in inferred}
         read: dict[int, list[Floats]] = {i: [] for i in nodes}
@@ -259,20 +266,23 @@ def in_parts(plan: Plan, draws: int) -> list[int]:
 class Virtual:
     """Virtual measurements of a part in all of its places, to be drawn in blocks.
 
-    ``known``, ``pilot``: as of :class:`AtPose`. ``places``: one a pose, of large features with as few coefficients as serve;
-    ``whole``: the same with those of every point. ``exact``: whether nothing is taken to first order, because that is off by
-    more than a hundredth of an uncertainty; ``off``: (c,) by how much it is in the first place, of the standard deviation.
+    ``known``, ``pilot``: as of :class:`AtPose`. ``first``: the same part measured otherwise, of which what was found is taken.
+    ``places``: one a pose, of large features with as few coefficients as serve; ``whole``: the same with those of every point.
+    ``exact``: whether nothing is taken to first order, because that is off by more than a hundredth of an uncertainty;
+    ``off``: (c,) by how much it is in the first place, of the standard deviation.
     """
 
     def __init__(
-        self, plan: Plan, given: MeasurementConditions, known: Known | None = None, pilot: int = PILOT
-    ) -> None:
-        self.plan = plan
-        self.known: Known = {} if known is None else known
-        self.places = [AtPose(plan, given, pose, self.known, pilot) for pose in given.poses]
-        self.off = self.places[0].off()
+        self, plan: Plan, given: MeasurementConditions, known: Known | None = None, pilot: int = PILOT,
+        first: Virtual | None = None,
+    ) -> None:  # fmt: skip
+        self.plan, self.poses = plan, given.poses
+        self.known: Known = first.known if first is not None else known if known is not None else {}
+        like = dict(zip(first.poses, first.whole, strict=True)) if first is not None else {}
+        self.places = [AtPose(plan, given, pose, self.known, pilot, like.get(pose)) for pose in given.poses]
+        self.off: Floats = self.places[0].off() if first is None else first.off
         self.exact = bool(np.any(self.off > AGREES))
-        self.whole = self.places
+        self.whole: list[AtPose] = self.places
         if not self.exact:
             self.places = [place.condensed() for place in self.places]
 
@@ -295,7 +305,7 @@ class Virtual:
         counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
         found = [
             place.errors(place.drawn(random, part), exact=self.exact)
-            for place, count in zip(self.places, counts, strict=True)
+            for place, count in zip((one.summed or one for one in self.places), counts, strict=True)
             for part in in_parts(self.plan, int(count))
         ]
         return np.concatenate(found)
@@ -309,14 +319,6 @@ class Virtual:
     def source(self) -> Source:
         """The errors as outputs of a Monte Carlo."""
         return Source(self.names, lambda random, n: np.ascontiguousarray(self.errors(random, n).T))
-
-    def simulated(self, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
-        """So many virtual measurements: means, covariance, intervals of the errors."""
-        return simulate(self.source, trials, coverage, seed)
-
-    def settled(self, coverage: float = 0.95, digits: int = 2, seed: int = 0) -> Simulated:
-        """As many as the digits of u that are asked for need (JCGM 101, 7.9), a hundred thousand at least."""
-        return simulate_adaptively(self.source, coverage, digits, seed, fewest_trials=FEWEST)
 
 
 _DRAWS = 4000

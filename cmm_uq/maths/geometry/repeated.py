@@ -18,7 +18,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import circumscribed, inscribed as largest_inside, least_zone
 from cmm_uq.maths.geometry.minimax import SCREENED, held, least_zones
-from cmm_uq.maths.geometry.placed import LINE, SIZED, FeatureKind, Placed, placed
+from cmm_uq.maths.geometry.placed import LINE, SIZED, STRAIGHT, FeatureKind, Placed, placed
 
 SETTLED = 1e-9  # steps, mm, below which a draw is at its minimum; what is left is far smaller
 # the first steps are with the normal equations of the nominal points. They settle slowly, or not at all, where points are off
@@ -103,11 +103,36 @@ class Repeated:
     def least_squares(self, displacements: ArrayLike | Raised) -> Drawn:
         """The least-squares feature of each draw, to 1e-9 mm."""
         errors = self._checked(displacements)
+        if isinstance(errors, Raised) and (flat := self._flat(errors)) is not None:
+            return flat
         state, form = np.empty((len(errors), len(self.placed.state))), np.empty(len(errors))
         begun = self._begun(errors)
         for rows in self._blocks(len(errors)):
             state[rows], d = self._descended(self._local(errors[rows], rows.start), begun(rows), rows.start)
             form[rows] = 2 * d.max(axis=1) if self.placed.shape is LINE else np.ptp(d, axis=1)
+        return self._drawn(state, form)
+
+    def _flat(self, errors: Raised) -> Drawn | None:
+        """Of a line or a plane whose points move across it: distances are linear then, and one step is enough.
+
+        ``None`` of all else, and where points move along it by as much as shows.
+        """
+        along = self.placed.frame @ errors.directions.T
+        still = self.nominal + self.placed.frame @ errors.offset.T
+        if self.placed.shape not in STRAIGHT or not len(errors):
+            return None
+        design = np.vstack([np.ones(len(self.points)), still[:-1]])  # (k, n)
+        inverse = np.linalg.pinv(design)
+        state = errors.heights @ (along[-1][:, None] * inverse) + still[-1] @ inverse
+        sideways = np.abs(along[:-1]).max() * max(errors.heights.max(), -errors.heights.min())
+        if sideways * np.abs(state[:, 1:]).max() > SETTLED / 100:
+            return None
+        lines, heights = np.insert(-state, 0, 1.0, axis=1), np.vstack([still[-1], design])
+        form = np.empty(len(state))
+        for rows in self._blocks(len(errors), 10 * BLOCK):
+            d = lines[rows] @ heights
+            d += along[-1] * errors.heights[rows]
+            form[rows] = np.ptp(d, axis=1) / np.sqrt(1 + np.sum(state[rows, 1:] ** 2, axis=1))
         return self._drawn(state, form)
 
     def followed(self, displacements: Floats, step: float) -> tuple[Floats, Floats]:

@@ -14,7 +14,7 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.maths.uncertainty.distributions import normal
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.propagation import first_order
+from cmm_uq.maths.uncertainty.propagation import first_order, simulate
 from tests.parts_drawn import POSE, circle, machine, plane, spot
 
 SIGMA, TRIALS = 1e-3, 40_000
@@ -74,7 +74,7 @@ def test_virtual_measurements_of_linear_cases_are_what_the_law_of_propagation_sa
     state = machine(["scale_x", "squareness_xy"], draws, noise=StatedNoise(np.full(3, SIGMA)))
     warm = Surroundings(Expansion(11.5e-6, 1e-6, 22.0, 0.3))
     plan = Plan(FEATURES, ASKED, (Stylus("stylus", u_diameter_um=0.8),))
-    found = Virtual(plan, MeasurementConditions(state, (POSE,), warm)).simulated(TRIALS, seed=5)
+    found = simulate(Virtual(plan, MeasurementConditions(state, (POSE,), warm)).source, TRIALS, seed=5)
     u, wanted = found.u, np.sqrt(np.diagonal(expected.covariance))
     np.testing.assert_allclose(u, wanted, rtol=0.02)
     correlation = found.covariance / np.outer(u, u)

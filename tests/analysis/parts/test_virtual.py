@@ -19,6 +19,7 @@ from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
 from cmm_uq.base.units import ARCSECOND
+from cmm_uq.maths.uncertainty.propagation import simulate, simulate_adaptively
 from tests.parts_drawn import MACHINE, POSE, block, bore, circle, machine, plane, spot
 
 APART = (PartCharacteristic("apart", "distance", ("one", "other")),)
@@ -213,7 +214,7 @@ def test_linear_characteristics_have_the_covariance_of_the_law_of_propagation() 
     noise = 1.5e-3
     state = machine(["scale_x", "scale_y", "squareness_xy"], draws, 1e3 * noise)
     pose = PartPose(np.eye(3), np.array([100.0, 100.0, -300.0]))
-    found = Virtual(plan, MeasurementConditions(state, (pose,))).simulated(200_000, seed=7).covariance
+    found = simulate(Virtual(plan, MeasurementConditions(state, (pose,))).source, 200_000, seed=7).covariance
     diagonal = np.hypot(400.0, 250.0)
     unit = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "xy": np.array([400, 250, 0]) / diagonal}
     J = np.array([[-400.0 * 1e-6, 0, 0], [0, -250.0 * 1e-6, 0],
@@ -258,7 +259,7 @@ def test_as_many_measurements_are_drawn_as_the_digits_need_and_what_is_measured_
     """An uncorrected scale of 40 ± 10 ppm, 300 mm: indicated 299.988 mm for what is 300 mm, u = 3 µm."""
     draws = 40 + 10 * np.random.default_rng(8).standard_normal((20_000, 1))
     virtual = Virtual(pair(), MeasurementConditions(machine(["scale_x"], draws, corrected=False), (POSE,)))
-    simulated = virtual.settled(digits=1)
+    simulated = simulate_adaptively(virtual.source, digits=1, fewest_trials=100_000)
     indicated = pair().points * [1 - 40e-6, 1, 1]
     one = stated(simulated, evaluated(pair(), indicated))[0]
     assert simulated.stable
@@ -421,7 +422,8 @@ def test_a_mean_error_is_taken_off_what_was_measured_once(what: str) -> None:
 @pytest.mark.parametrize(("digits", "least"), [(1, 100_000), (3, 200_000)])
 def test_as_many_are_drawn_as_the_digits_need(digits: int, least: int) -> None:
     """u of a distance by two readings, √2 · 1 µm, to better than 1 %, by a hundred thousand at least (JCGM 101:2008, 7.9)."""
-    found = Virtual(pair(), MeasurementConditions(machine(noise_um=1.0), (POSE,))).settled(digits=digits)
+    source = Virtual(pair(), MeasurementConditions(machine(noise_um=1.0), (POSE,))).source
+    found = simulate_adaptively(source, digits=digits, fewest_trials=100_000)
     assert found.trials >= least
     assert found.u[0] == pytest.approx(np.sqrt(2) * 1e-3, rel=0.01)
     low, high = found.interval[0]

@@ -18,8 +18,8 @@ are moved along their normals: a displacement across the normal changes a distan
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -223,6 +223,8 @@ class CondensedCause(PartCause):
     single: Ints  # (s,) rows of points that are moved along their normals: then a coefficient each
     normals: Floats  # (n, 3) of all points
     sums: Floats  # (a, r, p) changes of what follows to first order from all other points: then r coefficients an axis
+    scale: Draw | None  # draws (N, a) of factors on the sizes along the axes; none where these are one
+    share: Floats  # (a, s) of the variance along each normal that is along each axis; (a, 1) where it is that of all points
 
     def through(self, derivative: Floats) -> Floats:
         p = len(derivative)
@@ -268,6 +270,23 @@ class CondensedCause(PartCause):
         return coefficients[:, skipped + first : skipped + last] * self._sizes[first:last], self.single[first:last]
 
 
+def together(causes: Sequence[PartCause]) -> list[PartCause]:
+    """The same in distribution: sums of what moves each point on its own, along its normal and nothing else, as one cause."""
+    alone = [one for one in causes if isinstance(one, CondensedCause) and len(one.single) == len(one.factors)]
+    if len(alone) < 2:
+        return list(causes)
+    first, squares = alone[0], [one._sizes**2 for one in alone]
+
+    def draw(random: np.random.Generator, n: int) -> Floats:
+        variance = np.zeros((n, len(first.single)))
+        for one, square in zip(alone, squares, strict=True):
+            variance += square if one.scale is None else square * (np.asarray(one.scale(random, n)) ** 2 @ one.share)
+        return np.asarray(np.sqrt(variance, out=variance) * random.standard_normal(variance.shape))
+
+    one = replace(first, draw=draw, vectors=first.normals[None], scale=None, share=np.ones((1, 1)))
+    return [*(cause for cause in causes if cause not in alone), one]
+
+
 def condensed(cause: PartCause, plan: Plan, on_points: Collection[str], derivative: Floats) -> PartCause:
     """A cause by fewer coefficients, where it moves each point of a large feature on its own; else itself.
 
@@ -286,7 +305,7 @@ def condensed(cause: PartCause, plan: Plan, on_points: Collection[str], derivati
     rest, acts = _rows(plan, large - set(on_points)), np.abs(vectors).max(axis=(0, 2)) > 0
     whole = np.setdiff1d(np.flatnonzero(acts), np.concatenate([single, rest]))
     sums = _summed(vectors[:, rest], derivative[:, rest])
-    single = single[acts[single]]
+    single = single if acts[single].any() else single[:0]
     a, w, s, r = len(vectors), len(whole), len(single), sums.shape[1]
     along = np.einsum("asi,si->as", vectors[:, single], plan.normals[single]) ** 2
     share = along / np.maximum(along.sum(axis=0), np.finfo(np.float64).tiny)
@@ -303,7 +322,7 @@ def condensed(cause: PartCause, plan: Plan, on_points: Collection[str], derivati
 
     return CondensedCause(
         name=cause.name, factors=(cause.factors[0],) * (a * w + s + a * r), draw=draw, named=cause.named, vectors=vectors,
-        whole=whole, single=single, normals=plan.normals, sums=sums,
+        whole=whole, single=single, normals=plan.normals, sums=sums, scale=scale, share=share,
     )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ _LATITUDES = ((90.0, 1, 0.0), (67.5, 4, 0.0), (45.0, 8, 22.5), (22.5, 4, 45.0), 
 # mm: the last step towards where the machine indicates; what is left is smaller by what errors change over a millimetre
 _SETTLED = 1e-7
 _ROUNDS = 12
-_TURNED = 64  # points that are turned at once: their columns stay in the cache of a core
+_TURNED = 60_000  # components that are turned at once: they stay in the cache of a core
 
 
 def styli(plan: Plan, pose: PartPose) -> list[PartCause]:
@@ -150,24 +150,47 @@ def modelled(
 ) -> tuple[CommonCause, Floats]:
     """What the calibration modelled, and by how much (n, 3) the machine displaces points without any draw, mm.
 
+    Draws are differences of whole draws of its posterior from their mean, and drift since then.
+
     ``measured``: (n, 3) by how much points were measured beside the plan's, in the frame of the part: what scales read there
     says the phase of a short period.
     """
-    columns = _columns_of(state, qualified, pose, measured)
-    return _modelled(state, qualified, pose, columns), _mean_errors(state, qualified, pose, columns)
+    acting, mean, _ = _plain(state)
+    about = read = acting.about(qualified.both, mean)
+    if len(acting.effects) < len(state.effects):  # errors with a period go by what scales read
+        shown = _read(state, qualified, pose, measured)
+        read = replace(about, points=replace(shown, directions=about.points.directions))
+    basis, e, start = np.empty((len(state.mean), len(qualified.part), 3)), np.zeros((len(qualified.both), 3)), 0
+    for effect in state.effects:  # one after the other: the columns of all together are hundreds of megabytes
+        own, period = slice(start, start := start + len(effect.coefficients)), isinstance(effect, GivenPeriod)
+        columns = read.columns(effect) if period else about.columns(effect, state.shapes.get(effect.name, ()))
+        basis[own] = _in_part(qualified.left(columns), pose)
+        if period:
+            e += np.ascontiguousarray(columns) @ state.mean[own]
+    factors = [effect.name for effect in state.effects for _ in effect.coefficients]
+    deviations, drift = state.deviations, np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
+
+    def draw(random: np.random.Generator, n: int) -> Drawn:
+        drawn = Rows(deviations, random.integers(len(deviations), size=n))
+        if not state.drift.any():
+            return drawn
+        return np.asarray(drawn) + random.standard_normal((n, len(drift))) * drift
+
+    why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
+    said = say("the calibration shows little of it; as large as the bound that is stated allows")
+    why |= {effect.name: said for effect in state.effects if effect.stated and effect.name in why}
+    as_others = say("the calibration shows little of it; as large as it shows errors of this kind to be")
+    why |= dict.fromkeys(state.as_family, as_others)
+    machine = CommonCause(name=MACHINE, factors=tuple(factors), draw=draw, named=why, basis=basis)
+    return machine, _mean_errors(state, qualified, pose, e)
 
 
-def _mean_errors(state: MachineState, qualified: Qualified, pose: PartPose, columns: Floats) -> Floats:
+def _mean_errors(state: MachineState, qualified: Qualified, pose: PartPose, e: Floats) -> Floats:
     """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
 
-    Where the machine indicates by the mean of what is known, and what it corrects there; of errors with a period it
-    corrects none.
+    Where the machine indicates by the mean of what is known, and what it corrects there; of errors ``e`` with a period, of
+    points and spheres, it corrects none.
     """
-    e, start = np.zeros((len(qualified.both), 3)), 0
-    for effect in state.effects:
-        own = slice(start, start := start + len(effect.coefficients))
-        if isinstance(effect, GivenPeriod):
-            e += np.ascontiguousarray(columns[:, :, own]) @ state.mean[own]
     periodic = -pose.back(qualified.left(e[:, :, None])[:, :, 0])
     if np.array_equal(state.corrects, state.mean):
         return periodic
@@ -203,43 +226,6 @@ def _indicated(acting: Superposition, coefficients: Floats, points: Points, true
         if np.abs(change).max(initial=0.0) < _SETTLED:
             break
     return indicated
-
-
-def _columns_of(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None) -> Floats:
-    """(n + q, 3, k) errors by small changes of what was modelled about its mean (:meth:`Superposition.about`)."""
-    acting, mean, _ = _plain(state)
-    about = acting.about(qualified.both, mean)
-    given = any(isinstance(effect, GivenPeriod) for effect in state.effects)
-    read = _read(state, qualified, pose, measured) if given else qualified.both
-    none = np.zeros((len(qualified.both), 3, 0))
-    as_read = replace(about, points=replace(read, directions=about.points.directions))  # errors with a period go by it
-    columns = (
-        as_read.columns(effect)
-        if isinstance(effect, GivenPeriod)
-        else about.columns(effect, state.shapes.get(effect.name, ()))
-        for effect in state.effects
-    )
-    return np.concatenate([none, *columns], axis=2)
-
-
-def _modelled(state: MachineState, qualified: Qualified, pose: PartPose, columns: Floats) -> CommonCause:
-    """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then."""
-    factors = [effect.name for effect in state.effects for _ in effect.coefficients]
-    deviations, drift = state.deviations, np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
-
-    def draw(random: np.random.Generator, n: int) -> Drawn:
-        drawn = Rows(deviations, random.integers(len(deviations), size=n))
-        if not state.drift.any():
-            return drawn
-        return np.asarray(drawn) + random.standard_normal((n, len(drift))) * drift
-
-    why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
-    said = say("the calibration shows little of it; as large as the bound that is stated allows")
-    why |= {effect.name: said for effect in state.effects if effect.stated and effect.name in why}
-    as_others = say("the calibration shows little of it; as large as it shows errors of this kind to be")
-    why |= dict.fromkeys(state.as_family, as_others)
-    basis = _in_part(qualified.left(columns), pose)
-    return CommonCause(name=MACHINE, factors=tuple(factors), draw=draw, named=why, basis=basis)
 
 
 def not_modelled(state: MachineState, qualified: Qualified, pose: PartPose) -> tuple[list[PartCause], dict[str, str]]:
@@ -324,7 +310,8 @@ def _one_of(ratio: Floats) -> Draw | None:
 def _in_part(columns: Floats, pose: PartPose) -> Floats:
     """Errors (n, 3, k) of the machine as displacements (k, n, 3) in the frame of the part."""
     found = np.empty((columns.shape[2], *columns.shape[:2]))
-    for start in range(0, len(columns), _TURNED):
-        rows = slice(start, start + _TURNED)
+    step = max(1, _TURNED // max(1, 3 * len(found)))
+    for start in range(0, len(columns), step):
+        rows = slice(start, start + step)
         found[:, rows] = -np.moveaxis(pose.rotation.T @ columns[rows], 2, 0)
     return found

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts import virtual
+from cmm_uq.analysis.parts import budget, virtual
 from cmm_uq.analysis.parts.causes import cause as condensing
 from cmm_uq.analysis.parts.causes.surroundings import SurfaceForm
 from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, PartFeature, Plan
@@ -105,6 +106,34 @@ def test_zones_of_points_that_stand_out_are_those_of_all_points(
     every = repeated.minimum_zone(errors)
     np.testing.assert_allclose(screened.form, every.form, rtol=0, atol=1e-12)
     np.testing.assert_allclose(screened.direction, every.direction, rtol=0, atol=1e-12)
+
+
+def test_what_moves_points_on_its_own_is_drawn_as_one_cause_as_it_is_as_several() -> None:
+    """Squares of all points together, which the common factor of a draw makes vary, and heights of one of them."""
+    flat = Plan((face(35, 36),), PLAN.characteristics[:1])
+    place, rows = Virtual(flat, circumstances(flat.points)).places[0], flat.rows["A"]
+    assert place.summed is not None
+    several, random = place.causes, np.random.default_rng(6)
+    one, count = condensing.together(several), 3000
+    assert len(several) - len(one) == 1
+    heights = [
+        sum(each.raised(np.asarray(each.draw(random, count)), rows, flat.normals) for each in causes)
+        for causes in ([each for each in several if each not in one], one[-1:])
+    ]
+    for of in (lambda each: np.mean(each**2, axis=1), lambda each: each[:, 7]):
+        assert stats.ks_2samp(*map(of, heights)).pvalue > 1e-4
+
+
+def test_places_are_compared_by_some_points_of_a_large_feature() -> None:
+    times, order = np.arange(3000.0)[::-1], np.arange(3000)[::-1]
+    plan = replace(PLAN, features=(face(40, 75), bore(3, 8)), order=np.append(order, 3000 + np.arange(24)),
+                   times_s=np.append(times, 4000.0 + np.arange(24)))  # fmt: skip
+    few, given = budget._thinned(plan, circumstances(plan.points + 1.0))
+    np.testing.assert_array_equal(few.feature("A").points, plan.points[:3000:3])
+    np.testing.assert_array_equal(few.feature("bore").points, plan.points[3000:])
+    np.testing.assert_array_equal(given.measured, few.points + 1.0)
+    assert np.all(np.diff(few.times_s[few.order]) > 0)
+    assert budget._thinned(PLAN, given) == (PLAN, given)
 
 
 def test_what_acts_on_small_features_stays_as_it_is() -> None:
