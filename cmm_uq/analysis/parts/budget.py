@@ -25,7 +25,7 @@ from cmm_uq.analysis.parts.causes.cause import LARGE, Drawn, PartCause, Rows
 from cmm_uq.analysis.parts.causes.machine import MACHINE, NOISE, STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, FORM, OPERATOR, ROUNDING, TEMPERATURE
 from cmm_uq.analysis.parts.plan import PartPose, Plan
-from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual, in_parts
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual, in_parts, thinned
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say, signed
 from cmm_uq.base.points import Floats
@@ -236,8 +236,7 @@ class PointErrors:
 def point_errors(virtual: Virtual, draws: int = POINT_DRAWS, seed: int = 0) -> PointErrors:
     """Mean and covariance of the error of each point, each place as often as the others."""
     points, random = virtual.plan.points, np.random.default_rng(seed)
-    n = len(points)
-    rigid = _rigid(points)
+    n, rigid = len(points), _rigid(points)
     draws = max(draws // 4, min(draws, draws * LARGE // max(n, 1)))
     block = max(1, min(draws, _BLOCK // (3 * n)))
     each = max(1, -(-draws // len(virtual.whole)))
@@ -369,7 +368,7 @@ def _elsewhere(plan: Plan, given: MeasurementConditions, first: Virtual, draws: 
         return []
     read = first.places[0].points.carriages
     room = np.stack([travel[:2, 0] - read[:, :2].min(axis=0), travel[:2, 1] - read[:, :2].max(axis=0)])  # (2, axes)
-    few, near = _thinned(plan, given)
+    few, near = thinned(plan, given)
     place = first.places[0] if few is plan else AtPose(few, near, given.poses[0], first.known).condensed()
     planned, best = _quick(place, seed), (1.0, given, np.zeros(2))
     for part in product((0.0, 0.5, 1.0), repeat=2):
@@ -385,20 +384,6 @@ def _elsewhere(plan: Plan, given: MeasurementConditions, first: Virtual, draws: 
     x, y = (signed(float(mm), "+.0f") for mm in best[2])
     name = say("part moved by {x} mm along {a} and {y} mm along {b}", x=x, y=y, a=Verbatim("X"), b=Verbatim("Y"))
     return [Way(name, spread(Virtual(plan, best[1], pilot=_PILOT, first=first), draws, seed), draws)]
-
-
-def _thinned(plan: Plan, given: MeasurementConditions) -> tuple[Plan, MeasurementConditions]:
-    """The plan with some points for all of those of large features, by which places are compared; itself where it has none."""
-    steps = {name: max(1, (rows.stop - rows.start) // LARGE) for name, rows in plan.rows.items()}
-    if max(steps.values()) == 1 or given.further:
-        return plan, given
-    kept = {name: np.arange(of.start, of.stop, steps[name]) for name, of in plan.rows.items()}
-    rows, points, normals = np.concatenate(list(kept.values())), plan.points, plan.normals
-    features = tuple(replace(f, points=points[kept[f.name]], normals=normals[kept[f.name]]) for f in plan.features)
-    order, times = plan.order[np.isin(plan.order, rows)], plan.times_s
-    times = times[rows] if len(times) else times
-    few = replace(plan, features=features, order=np.searchsorted(rows, order), times_s=times)
-    return few, replace(given, measured=None if given.measured is None else given.measured[rows])
 
 
 def _quick(place: AtPose, seed: int) -> Floats:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 
 import numpy as np
@@ -261,6 +261,20 @@ def in_parts(plan: Plan, draws: int) -> list[int]:
     """So many draws in parts, of no more points at once than memory should hold."""
     at_once = max(2, (_AT_ONCE if len(plan.points) <= LARGE else _AT_ONCE_OF_MANY) // len(plan.points))
     return [min(at_once, draws - first) for first in range(0, draws, at_once)]
+
+
+def thinned(plan: Plan, given: MeasurementConditions) -> tuple[Plan, MeasurementConditions]:
+    """The plan with some points for all of those of large features, by which places are compared; itself where it has none."""
+    steps = {name: max(1, (rows.stop - rows.start) // LARGE) for name, rows in plan.rows.items()}
+    if max(steps.values()) == 1 or given.further:
+        return plan, given
+    kept = {name: np.arange(of.start, of.stop, steps[name]) for name, of in plan.rows.items()}
+    rows, points, normals = np.concatenate(list(kept.values())), plan.points, plan.normals
+    features = tuple(replace(f, points=points[kept[f.name]], normals=normals[kept[f.name]]) for f in plan.features)
+    order, times = plan.order[np.isin(plan.order, rows)], plan.times_s
+    times = times[rows] if len(times) else times
+    few = replace(plan, features=features, order=np.searchsorted(rows, order), times_s=times)
+    return few, replace(given, measured=None if given.measured is None else given.measured[rows])
 
 
 class Virtual:

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts import budget, virtual
+from cmm_uq.analysis.parts import virtual
 from cmm_uq.analysis.parts.causes import cause as condensing
 from cmm_uq.analysis.parts.causes.surroundings import SurfaceForm
 from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, PartFeature, Plan
@@ -128,12 +128,12 @@ def test_places_are_compared_by_some_points_of_a_large_feature() -> None:
     times, order = np.arange(3000.0)[::-1], np.arange(3000)[::-1]
     plan = replace(PLAN, features=(face(40, 75), bore(3, 8)), order=np.append(order, 3000 + np.arange(24)),
                    times_s=np.append(times, 4000.0 + np.arange(24)))  # fmt: skip
-    few, given = budget._thinned(plan, circumstances(plan.points + 1.0))
+    few, given = virtual.thinned(plan, circumstances(plan.points + 1.0))
     np.testing.assert_array_equal(few.feature("A").points, plan.points[:3000:3])
     np.testing.assert_array_equal(few.feature("bore").points, plan.points[3000:])
     np.testing.assert_array_equal(given.measured, few.points + 1.0)
     assert np.all(np.diff(few.times_s[few.order]) > 0)
-    assert budget._thinned(PLAN, given) == (PLAN, given)
+    assert virtual.thinned(PLAN, given) == (PLAN, given)
 
 
 def test_what_acts_on_small_features_stays_as_it_is() -> None:
