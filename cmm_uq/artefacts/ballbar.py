@@ -58,14 +58,12 @@ class Ballbar(Artefact):
         self.points = points
         self._facts = facts
         self.rows = _ends(points, where)
-        first = self.rows[:, 0]
-        self.measurement, self.repeat = points.measurement[first], points.repeat[first]
-        self.noise_scale = np.full(len(first), np.sqrt(2.0))
+        self.noise_scale = np.full(len(self.rows), np.sqrt(2.0))
         self.expansion = expansion(facts, points)[self.rows].mean(axis=1)
         self._known = (np.zeros((0, 3)), np.zeros((0, 3)))
         lengths = self.lengths()
         if np.any(lengths == 0):
-            line = points.lines[first[np.argmin(lengths)]] if len(points.lines) else 0
+            line = points.lines[self.rows[np.argmin(lengths), 0]] if len(points.lines) else 0
             raise CmmUqError("both ends of the bar lie in one place", where=f"{where or 'recording'} line {line}",
                              fix="Record the centres of two different balls")  # fmt: skip
         length, sd = length_of(facts, float(lengths.mean()), "the recorded bars", where)

@@ -121,7 +121,6 @@ class DigitizerArtefact(Artefact):
             ScannedSphere(facts, points.at(self._seen_at), where) if self.scanned else Centre(len(points))
         )
         self.rows, self.noise_scale = self.target.rows, self.target.noise_scale
-        self.measurement, self.repeat = points.measurement[self.rows[:, 0]], points.repeat[self.rows[:, 0]]
         self.u_turn, self.u_shift = facts.u_attitude_arcsec, facts.u_centre_um
         sought = (
             Size(f"{name}_mm", Verbatim(name), unit("mm"), float(value), np.inf, role="sought")

@@ -139,9 +139,7 @@ class StepGauge(Artefact):
         self._lines = Placings.of(points.measurement)
         self._ends = _ends(self.reference, self._lines)
         self._refuse_what_is_no_gauge(where)
-        self.measurement, self.repeat = points.measurement, points.repeat
         self.rows = np.arange(len(points))[:, None]
-        self.noise_scale = np.ones(len(points))
         self.expansion = expansion(facts, points)
         spans = self._lines.sums(self._ends * self.reference)
         length = facts.length_mm or float(spans.max())

@@ -27,7 +27,7 @@ from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
-from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, Size
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.machine.physics.compensation import DirectionPointError, OffsetPlane, offset_plane
 from cmm_uq.maths.inference.linear_model import Freedoms
@@ -64,9 +64,6 @@ class PlaneSurface(Artefact):
         contact = np.flatnonzero(points.point != DIRECTION_POINT)
         self.rows = contact[:, None]
         self.placings = Placings.of(points.measurement[contact])
-        self.measurement, self.repeat = points.measurement[contact], points.repeat[contact]
-        self.noise_scale = np.ones(len(contact))
-        self.sizes: tuple[Size, ...] = ()
         self.offset = facts.probe_offset_mm
         self.u_offset = facts.u_probe_offset_um * MICROMETRE
         self.form = (facts.form_um or 0.0) * MICROMETRE
@@ -88,9 +85,6 @@ class PlaneSurface(Artefact):
         contact = self.rows[:, 0]
         normals = self._axes(xyz[contact])[:, :, 0]
         return np.asarray(np.einsum("ni,nik->nk", normals, displacement[contact]), dtype=np.float64)
-
-    def size_change(self) -> Floats:
-        return np.zeros((len(self.rows), 0))
 
     def placing(self, xyz: Floats) -> Freedoms:
         touched = xyz[self.rows[:, 0]]

@@ -78,7 +78,6 @@ class AxisRuns(Artefact):
         self.rows = np.flatnonzero(~end)[:, None]
         own = points.select(~end)
         self.runs = runs_of(own, where)
-        self.measurement, self.repeat = own.measurement, own.repeat
         self._zeros = self._zeros_of(own)
         self._kind = kinds_of(self.runs, len(own))
         self._turned, self._ends = np.flatnonzero(self._kind == TURNING), self._ends[self._kind == TURNING]

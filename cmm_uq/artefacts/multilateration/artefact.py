@@ -98,8 +98,7 @@ class Multilateration(Artefact):
             self.drift = hours - self.stations.means(hours)
         if IDEAL not in points.columns:
             points = self._with_ideal(points)
-        self.points, self.measurement, self.repeat = points, points.measurement, points.repeat
-        self.rows, self.noise_scale = np.arange(count)[:, None], np.ones(count)
+        self.points, self.rows = points, np.arange(count)[:, None]
         self._known = (np.zeros((0, 3)), np.zeros((0, 3)))
         ideal = points.columns[IDEAL]
         self.found = self._nearest(points.xyz, ideal, self._first(points, ideal))

@@ -90,9 +90,7 @@ class ScannedBallbar(Ballbar):
         tip = np.column_stack([columns[f"tip_{axis}_mm"][first] for axis in AXES])
         nominal = (points.xyz[first][:, None] + self._apart[:, None, None] * _AROUND).reshape(-1, 3)
         self._centre = points.xyz[first] + tip + self._moved((points.xyz - nominal)[:, :, None])[:, :, 0]
-        lines = self.rows[:, 0]
-        self.measurement, self.repeat = points.measurement[lines], points.repeat[lines]
-        self.noise_scale = np.full(len(lines), np.sqrt(2.0))
+        self.noise_scale = np.full(len(self.rows), np.sqrt(2.0))
         self.expansion = expansion(facts, points)[self.rows].mean(axis=1)
         lengths = self.lengths()
         length, sd = length_of(facts, float(lengths.mean()), "the scanned bars", where)

@@ -51,8 +51,7 @@ class ScannedPlanes(Artefact):
         self._attitude = attitude.ravel()
         self.points = replace(points, machine=replace(points.machine, tip_on_every_carriage=True))
         self.planes = Placings.of(points.measurement)
-        self.measurement, self.repeat = points.measurement, points.repeat
-        self.rows, self.noise_scale = np.arange(len(points))[:, None], np.ones(len(points))
+        self.rows = np.arange(len(points))[:, None]
         seen = points.xyz + self._seen(self.indexed)
         self._normals = np.empty((len(points), 3))
         for i, rows in enumerate(self.planes.rows):

@@ -69,9 +69,8 @@ class ShiftedArtefact(Artefact):
         n, d = len(points), len(self._axes)
         self._free = np.arange(1, len(placings)) if free else np.zeros(0, dtype=np.int64)
         self.rows = np.repeat(np.arange(n), d)[:, None]
-        self.measurement, self.repeat = points.measurement[self.rows[:, 0]], points.repeat[self.rows[:, 0]]
         self.noise_scale = np.repeat(points.columns.get("noise_ratio", np.ones(n)), d)
-        self._known, self.sizes = None, ()
+        self._known = None
         self._start = self._laid(points.carriages, None)
         if facts.known is not None:
             self._known = known_points(facts.known, numbers)

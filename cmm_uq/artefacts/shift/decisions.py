@@ -28,18 +28,13 @@ class ShiftedReadings(Artefact):
     title = Verbatim("shift")
 
     def __init__(self, points: Points, figures: Mapping[str, ArtefactFigure]) -> None:
-        self.points, self._figures = points, figures
-        self.sizes, self.noise_scale, self.rows = (), np.ones(len(points)), np.arange(len(points))[:, None]
-        self.measurement, self.repeat = points.measurement, points.repeat
+        self.points, self._figures, self.rows = points, figures, np.arange(len(points))[:, None]
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         return true_xyz
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         return np.zeros((len(xyz), displacement.shape[2]))
-
-    def size_change(self) -> Floats:
-        return np.zeros((len(self.rows), 0))
 
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
         return self._figures

@@ -26,7 +26,7 @@ from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import deviating
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, Size
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.uncertainty.quantity import rounded
@@ -54,9 +54,6 @@ class TableSpheres(Artefact):
         each, index = np.unique(of, axis=0, return_inverse=True)
         self.spheres, self.placings = each, Placings(index.ravel().astype(np.int64), each[:, 0].astype(np.int64))
         self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
-        self.measurement, self.repeat = points.measurement[self.rows[:, 0]], points.repeat[self.rows[:, 0]]
-        self.noise_scale = np.ones(3 * len(points))
-        self.sizes: tuple[Size, ...] = ()
         away = self.placings.means(points.xyz) - self.machine.pivot
         self.axial = away[:, self.machine.about].copy()
         away[:, self.machine.about] = 0.0
@@ -70,9 +67,6 @@ class TableSpheres(Artefact):
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         return np.asarray((self.axes @ displacement).reshape(3 * len(xyz), -1), dtype=np.float64)
-
-    def size_change(self) -> Floats:
-        return np.zeros((len(self.rows), 0))
 
     def placing(self, xyz: Floats) -> Freedoms:
         return self.placings.columns(self.axes)

@@ -121,11 +121,8 @@ class Artefact(ABC):
     kind: str  # as in ``[artefact] kind``
     title: Text  # in words
     points: Points  # the recording
-    sizes: tuple[Size, ...]  # dimensions that enter the model
-    noise_scale: Floats  # (m,) standard uncertainty of each observation, per unit of that of one coordinate
-    measurement: Ints  # (m,) what each observation belongs to
-    repeat: Ints  # (m,)
     rows: Ints  # (m, j) the points that each observation speaks of, as rows of the recording
+    sizes: tuple[Size, ...] = ()  # dimensions that enter the model
     # whether each set-up reads a curve of its own, of which a model names the simplest form: outliers show among repeats,
     # and what is found predicts other points, not other set-ups
     curves: ClassVar[bool] = False
@@ -136,6 +133,20 @@ class Artefact(ABC):
     # what readings go by, beside its sizes, of which nobody states an uncertainty; with which observations (m,) do
     exact: tuple[tuple[Text, NDArray[np.bool_]], ...] = ()
     key_of_u: ClassVar[str] = "u_um"  # of ``[artefact]``, that says how uncertain its lengths are
+
+    @cached_property
+    def measurement(self) -> Ints:
+        """(m,) what each observation belongs to."""
+        return np.asarray(self.points.measurement[self.rows[:, 0]])
+
+    @cached_property
+    def repeat(self) -> Ints:
+        return np.asarray(self.points.repeat[self.rows[:, 0]])
+
+    @cached_property
+    def noise_scale(self) -> Floats:
+        """(m,) standard uncertainty of each observation, per unit of that of one coordinate."""
+        return np.ones(len(self.rows))
 
     @property
     def set_up(self) -> Text:
@@ -150,9 +161,9 @@ class Artefact(ABC):
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         """Change of the observations, (m, k) in mm, when the points at ``xyz`` (n, 3) move by ``displacement`` (n, 3, k)."""
 
-    @abstractmethod
     def size_change(self) -> Floats:
         """Change of the observations, (m, s), for one mm of each size."""
+        return np.zeros((len(self.rows), 0))
 
     def own_faults(self) -> Iterable[Effect]:
         """What may be wrong with the artefact itself: effects of the catalogue, made for this one."""

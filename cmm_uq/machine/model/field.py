@@ -103,9 +103,9 @@ class AxisFunction(Effect):
         simple = np.hstack([np.sqrt(1.25) * (3 * t**2 - 1), np.sqrt(3.0) * t])[:, : self.forms]
         each = np.hstack([simple, np.sqrt(2.0) * np.cos(angle[:, None] * self.orders)])
         if isinstance(self.of, Rotation):
-            lever = turned(points, axis, self.of.about, np.ones(len(points)))
+            lever = turned(points, axis, self.of.other, np.ones(len(points)))
             return np.asarray(lever * (ARCSECOND * each)[:, None, :])
-        return along(self.of.direction if isinstance(self.of, Straightness) else axis, MICROMETRE * each)
+        return along(self.of.other if isinstance(self.of, Straightness) else axis, MICROMETRE * each)
 
 
 def bounded(effect: Effect, largest_um: float) -> Effect:

@@ -38,12 +38,8 @@ class Radial(Artefact):
     def __init__(
         self, facts: ArtefactFacts, points: Points, centred: Placings, expansion: Floats, where: str | None
     ) -> None:
-        self.points = points
-        self.centred = centred
-        self.expansion = expansion
-        self.measurement, self.repeat = points.measurement, points.repeat
+        self.points, self.centred, self.expansion = points, centred, expansion
         self.rows = np.arange(len(points))[:, None]
-        self.noise_scale = np.ones(len(points))
         self._normals: Floats | None = None
         self._refuse_flat(where)
         mean = float(np.mean(self.distances(points.xyz, None) / expansion)) / self.per_size
@@ -147,8 +143,6 @@ class Rigid(Artefact):
         self.points = points
         self.placings = Placings.of(points.measurement)
         self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
-        self.measurement, self.repeat = points.measurement[self.rows[:, 0]], points.repeat[self.rows[:, 0]]
-        self.noise_scale = np.ones(3 * len(points))
 
     @abstractmethod
     def shape(self, sizes: Floats) -> Floats:

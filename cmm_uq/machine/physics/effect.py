@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import ClassVar
 
 import numpy as np
 
@@ -174,15 +173,27 @@ class Effect(ABC):
 
 
 class Family(Effect):
-    """One of several effects that differ by axes, whose letters fill the blanks of its words; ``{a}`` in columns' names."""
+    """One of several effects that differ by axes.
 
-    family: ClassVar[str]  # first part of the name
+    Their letters fill the blanks of its words, and ``{a}`` and ``{b}`` in names of columns and in what imitates it.
+    """
+
+    family: str  # first part of the name
 
     def __init__(self, axis: str, *others: str) -> None:
-        self.axis = axis
+        self.axis, self.other = axis, others[0] if others else axis
         self.name = "_".join((self.family, axis, *others))
-        self.columns = tuple(column.format(a=axis) for column in self.columns)
-        self.fill({AXIS: axis, OTHER: others[0] if others else axis})
+
+        def lettered(text: str) -> str:
+            return text.format(a=axis, b=self.other)
+
+        self.columns = tuple(map(lettered, self.columns))
+        self.idealised_over = self.idealised_over and lettered(self.idealised_over)
+        self.imitated_by = tuple(
+            replace(one, of=lettered(one.of), along=one.along and lettered(one.along)) for one in self.imitated_by
+        )
+        self.shape = tuple(replace(one, period_along=axis) if one.period_along else one for one in self.shape)
+        self.fill({AXIS: axis, OTHER: self.other})
 
     def fill(self, letters: Mapping[Text, str]) -> None:
         blanks: dict[Text, Text] = {blank: Verbatim(letter.upper()) for blank, letter in letters.items()}
@@ -208,7 +219,7 @@ class OfAxis(Family):
 class Harmonic(Effect):
     """An effect A·sin(… + φ) or A·cos(… + φ): linear in A·cos φ and A·sin φ, reported as amplitude and phase."""
 
-    amplitude: ClassVar[Parameter]
+    amplitude: Parameter
 
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:

@@ -5,11 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cmm_uq.base.messages import Message, Text, Verbatim, say
+from cmm_uq.base.messages import Argument, Message, Text, Verbatim, fields_of
 
 # blanks in words: the axes, and of the reported amount its size, side and sense, and the size of a second parameter
 _BLANKS = ("axis", "other", "size", "side", "sense", "second")
 AXIS, OTHER, SIZE, SIDE, SENSE, SECOND = (Verbatim(f"‹{blank}›") for blank in _BLANKS)
+# what stands for them in a pattern
+_NAMES: Mapping[str, Text] = {
+    "axis": AXIS, "other": OTHER, "direction": OTHER, "about": OTHER, "size": SIZE, "amplitude": SIZE, "side": SIDE,
+    "sense": SENSE, "more": SENSE, "wrong": SENSE, "where": SECOND, "period": SECOND, "settling": SECOND,
+}  # fmt: skip
+
+
+def say(pattern: str, /, **arguments: Argument) -> Message:
+    """Words of an effect: what its pattern names without an argument is a blank."""
+    known = {**_NAMES, **arguments}
+    return Message(pattern, {name: known[name] for name in sorted(fields_of(pattern))})
 
 
 def filled(text: Text, blanks: Mapping[Text, Text]) -> Text:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.machine.physics.effect import (
@@ -26,7 +26,7 @@ from cmm_uq.machine.physics.effect import (
     along,
 )
 from cmm_uq.machine.physics.effects.rigid_body import bow, turned
-from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SIDE, SIZE, Amount, filled
+from cmm_uq.machine.physics.words import AXIS, SIZE, Amount, filled, say
 from cmm_uq.maths.uncertainty.air.state import harris_2004
 
 _MILLISECOND = 1e-3  # 1 ms in s
@@ -39,27 +39,19 @@ _STANDARD = tuple(np.array(value) for value in (REFERENCE_TEMPERATURE, 101325.0,
 class PeriodicScale(OfAxis, Harmonic):
     """Periodic error of a scale, leadscrew or rack."""
 
-    family, title = "periodic_scale", say("Periodic scale error of {axis}", axis=AXIS)
+    family, title = "periodic_scale", say("Periodic scale error of {axis}")
     formula, mechanism = "e_a = A·sin(2π a/λ + φ)", "scale"
     points_to = say("an error that repeats with the period: scale interpolation, leadscrew or rack")
-    means = say(
-        "the error of {axis} swings to either side by {amplitude} and repeats every {period}",
-        axis=AXIS, amplitude=SIZE, period=SECOND,
-    )  # fmt: skip
-    several = say(
-        "the error of {axis} swings to either side by {amplitude} and repeats with one of several periods",
-        axis=AXIS, amplitude=SIZE,
-    )  # fmt: skip
+    means = say("the error of {axis} swings to either side by {amplitude} and repeats every {period}")
+    several = say("the error of {axis} swings to either side by {amplitude} and repeats with one of several periods")
     amplitude = Parameter("amplitude_um", unit("µm"), 10.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
     # errors that it is the sum of, where that is stated: each of any one period in its bands (from, to, mm; prior sd of sine
     # and of cosine, µm)
     errors: tuple[tuple[tuple[float, float, float], ...], ...] = ()
 
-    def __init__(self, axis: str) -> None:
-        super().__init__(axis)
-        self.shape = (Shape("period_mm", unit("mm"), 0.5, 1000.0, period_along=axis, what=say("period")),)
-        self.imitated_by = (Nonparametric(f"{axis}_mm", axis),)
+    shape = (Shape("period_mm", unit("mm"), 0.5, 1000.0, period_along="{a}", what=say("period")),)
+    imitated_by = (Nonparametric("{a}_mm", "{a}"),)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
         if self.shape[0].name in amounts:
@@ -68,28 +60,22 @@ class PeriodicScale(OfAxis, Harmonic):
         return filled(self.several, blanks)
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        (period,) = shape
-        angle = 2 * np.pi * points.readings[self.axis] / period
+        angle = 2 * np.pi * points.readings[self.axis] / shape[0]
         return MICROMETRE * np.column_stack([np.sin(angle), np.cos(angle)])
 
 
 class Hysteresis(OfAxis):
     """Different readings from either side."""
 
-    family, title = "hysteresis", say("Hysteresis of {axis}", axis=AXIS)
+    family, title = "hysteresis", say("Hysteresis of {axis}")
     formula, mechanism = "e_a = ½·gap·approach_a", "drive"
     points_to = say("backlash or friction in this drive: the reading depends on the side it is reached from")
     means = say(
         "at the same reading {axis} stands {size} further towards {side} when it comes from minus than when it comes from "
-        "plus", axis=AXIS, size=SIZE, side=SIDE,
-    )  # fmt: skip
+        "plus"
+    )
     coefficients = (Parameter("gap_um", unit("µm"), 30.0),)
-    columns = ("approach_{a}",)
-
-    def __init__(self, axis: str) -> None:
-        super().__init__(axis)
-        self.idealised_over = axis
-        self.imitated_by = (Nonparametric(f"approach_{axis}"),)
+    columns, idealised_over, imitated_by = ("approach_{a}",), "{a}", (Nonparametric("approach_{a}"),)
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         return 0.5 * MICROMETRE * points.column(f"approach_{self.axis}")
@@ -98,13 +84,12 @@ class Hysteresis(OfAxis):
 class Drift(OfAxis):
     """Drift of an axis with time."""
 
-    family, title = "drift", say("Drift of {axis} with time", axis=AXIS)
+    family, title = "drift", say("Drift of {axis} with time")
     formula, mechanism = "e_a = v · time", "temperature"
     points_to = say("the axis drifts with time: warm-up, or the room's temperature")
-    means = say("at the same reading {axis} moves towards {side} by {size}", axis=AXIS, side=SIDE, size=SIZE)
+    means = say("at the same reading {axis} moves towards {side} by {size}")
     coefficients = (Parameter("um_per_h", unit("µm/h"), 10.0),)
-    columns = ("time_s",)
-    idealised_over = "time_s"
+    columns, idealised_over = ("time_s",), "time_s"
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         return MICROMETRE * points.hours
@@ -116,25 +101,21 @@ class Play(Family):
     Worn or badly set bearings of the guideway. Along its own direction the same is hysteresis.
     """
 
-    family, title = "play", say("Lateral play of {axis} along {direction}", axis=AXIS, direction=OTHER)
+    family, title = "play", say("Lateral play of {axis} along {direction}")
     formula, mechanism = "e_b = ½·gap·approach_a", "guideway"
     points_to = say(
         "play across the guideway of {axis}: check wear, preload and air gap of the bearings that hold the carriage along "
-        "{direction}", axis=AXIS, direction=OTHER,
-    )  # fmt: skip
+        "{direction}"
+    )
     means = say(
         "at the same reading the probe stands {size} further towards {side} {direction} when {axis} comes from minus than "
-        "when it comes from plus", axis=AXIS, direction=OTHER, size=SIZE, side=SIDE,
-    )  # fmt: skip
+        "when it comes from plus"
+    )
     coefficients = (Parameter("gap_um", unit("µm"), 10.0),)
     columns, tier = ("approach_{a}",), FURTHER
 
-    def __init__(self, axis: str, direction: str) -> None:
-        super().__init__(axis, direction)
-        self.direction = direction
-
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.direction, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
+        return along(self.other, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
 
 
 class YawPlay(Family):
@@ -143,12 +124,12 @@ class YawPlay(Family):
     A bridge that is driven at one leg, or a drive that is not in line with friction and mass.
     """
 
-    family, title = "yaw_play", say("Yaw of carriage {axis} at reversal", axis=AXIS)
+    family, title = "yaw_play", say("Yaw of carriage {axis} at reversal")
     formula, mechanism = "e = ε × what carriage a carries, ε_z = ½·angle·approach_a", "guideway"
     points_to = say(
         "carriage {axis} yaws when it turns round: check the side bearings of its guideway, and where its drive takes hold "
-        "beside its middle", axis=AXIS,
-    )  # fmt: skip
+        "beside its middle"
+    )
     coefficients = (Parameter("angle_arcsec", unit("″"), 2.0),)
     columns, tier = ("approach_{a}",), FURTHER
 
@@ -162,12 +143,12 @@ class WindUp(OfAxis):
     A leadscrew or belt that winds up between motor and carriage, or is worn at one end ("unequal backlash").
     """
 
-    family, title = "windup", say("Wind-up of the drive of {axis}", axis=AXIS)
+    family, title = "windup", say("Wind-up of the drive of {axis}")
     formula, mechanism = "e_a = ½·w·approach_a·(a − middle of the travel)", "drive"
     points_to = say(
         "the drive of {axis} winds up, or is worn more at one end of the travel: check leadscrew, belt or rack, its tension "
-        "and its end bearings", axis=AXIS,
-    )  # fmt: skip
+        "and its end bearings"
+    )
     coefficients = (Parameter("um_per_m", unit("µm/m"), 20.0),)
     columns, tier = ("approach_{a}",), FURTHER
 
@@ -184,12 +165,12 @@ class SpeedLag(OfAxis):
     the direction of travel.
     """
 
-    family, title = "speed_lag", say("Lag of {axis} in proportion to speed", axis=AXIS)
+    family, title = "speed_lag", say("Lag of {axis} in proportion to speed")
     formula, mechanism = "e_a = lag·speed along a, in the sense of travel", "controller"
     points_to = say(
         "the scale of {axis} and the trigger are read at different moments: check how the controller latches this scale, and "
-        "probe more slowly until then", axis=AXIS,
-    )  # fmt: skip
+        "probe more slowly until then"
+    )
     coefficients = (Parameter("lag_ms", unit("ms"), 1.0),)
     columns, tier = ("speed_mm_s", *(f"approach_{a}" for a in AXES)), FURTHER
 
@@ -210,16 +191,13 @@ class ScaleCurvature(OfAxis):
     A scale clamped at both ends, a tape that is stretched unevenly, a rack of two pieces.
     """
 
-    family, title = "scale_curvature", say("Curvature of the scale of {axis}", axis=AXIS)
+    family, title = "scale_curvature", say("Curvature of the scale of {axis}")
     formula, mechanism = "e_a = bow·(1 − (2(a − a0)/T − 1)²)", "scale"
     points_to = say(
         "the scale of {axis} is stretched unevenly: check how its ends are clamped and its joints, and compensate position by "
-        "a table, which one factor cannot replace", axis=AXIS,
-    )  # fmt: skip
-    means = say(
-        "in the middle of its travel {axis} stands {size} further towards {side} than it reads",
-        axis=AXIS, size=SIZE, side=SIDE,
-    )  # fmt: skip
+        "a table, which one factor cannot replace"
+    )
+    means = say("in the middle of its travel {axis} stands {size} further towards {side} than it reads")
     coefficients = (Parameter("bow_um", unit("µm"), 10.0),)
     tier = FURTHER
 
@@ -233,12 +211,12 @@ class AirScale(OfAxis):
     Part 1 is no correction at all. About −1 ppm/K, +0.27 ppm/hPa, −0.01 ppm/% in n (Harris 2004 section 3.3).
     """
 
-    family, title = "air_scale", say("Refractive index of air on the laser scale of {axis}", axis=AXIS)
+    family, title = "air_scale", say("Refractive index of air on the laser scale of {axis}")
     formula, mechanism = "e_a = −part·(n − n₀)·a", "scale"
     points_to = say(
         "the laser of {axis} is not, or wrongly, corrected for air: check its sensors of air temperature, pressure and "
-        "humidity, and that the compensation uses them", axis=AXIS,
-    )  # fmt: skip
+        "humidity, and that the compensation uses them"
+    )
     coefficients = (Parameter("part", unit("1"), 1.0),)
     columns, tier = AIR, FURTHER
 
@@ -252,12 +230,12 @@ class DeadPath(OfAxis):
     The air between interferometer and zero changes its optical length while nothing moves.
     """
 
-    family, title = "dead_path", say("Dead path of the laser scale of {axis}", axis=AXIS)
+    family, title = "dead_path", say("Dead path of the laser scale of {axis}")
     formula, mechanism = "e_a = −d·(n − n at the first point)", "scale"
     points_to = say(
         "the dead path of the laser of {axis} is not compensated: enter it in the compensation, or zero the axis close to the "
-        "interferometer", axis=AXIS,
-    )  # fmt: skip
+        "interferometer"
+    )
     coefficients = (Parameter("path_mm", unit("mm"), 300.0),)
     columns, tier = AIR, FURTHER
 

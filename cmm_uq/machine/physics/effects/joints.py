@@ -21,11 +21,10 @@ import numpy as np
 
 from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, ArmPose, D
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 from cmm_uq.machine.physics.effect import FURTHER, Effect, Family, Harmonic, Parameter, Shape
-from cmm_uq.machine.physics.words import AXIS, SENSE, SIZE
+from cmm_uq.machine.physics.words import say
 
 
 class OfRows(Effect):
@@ -36,17 +35,13 @@ class OfRows(Effect):
         """(n, 5 j + 3, k) of the parameters, in mm and rad, for one unit of each coefficient."""
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return np.asarray(_posed(points).jacobian @ self.change(points, shape))
+        return np.asarray(arm_of(points).posed(points.columns).jacobian @ self.change(points, shape))
 
 
 def arm_of(points: Points) -> Arm:
     if not isinstance(points.machine, Arm):
         raise CmmUqError("the machine has no joints", where="job.toml [machine]", fix="Give [[machine.joint]] rows")
     return points.machine
-
-
-def _posed(points: Points) -> ArmPose:
-    return arm_of(points).posed(points.columns)
 
 
 class OfJoint(Family, OfRows):
@@ -68,17 +63,13 @@ class OfJoint(Family, OfRows):
         found[:, 5 * self.index + self.row] = self.amount(points, shape).reshape(len(points), -1)
         return found
 
-    def angle(self, points: Points) -> Floats:
-        """(n,) reading of the joint, rad."""
-        return np.radians(points.readings[self.axis])
-
 
 class Zero(OfJoint):
     """The joint's reading is not zero where its row has it: mastering, or how the encoder is mounted."""
 
-    family, title, formula = "zero", say("Zero of joint {axis}", axis=AXIS), "θ = reading + θ₀ + zero"
-    points_to = say("the zero of joint {axis} is off: master it again, or enter the zero that was found", axis=AXIS)
-    means = say("joint {axis} stands {size} {sense} than it reads", axis=AXIS, size=SIZE, sense=SENSE)
+    family, title, formula = "zero", say("Zero of joint {axis}"), "θ = reading + θ₀ + zero"
+    points_to = say("the zero of joint {axis} is off: master it again, or enter the zero that was found")
+    means = say("joint {axis} stands {size} {sense} than it reads")
     sense = (say("farther"), say("less far"))
     coefficients = (Parameter("arcsec", unit("″"), 1000.0),)
 
@@ -87,8 +78,8 @@ class Length(OfJoint):
     """The common normal of two joint axes is longer, a."""
 
     row, family, mechanism = A, "length", "link"
-    title, formula = say("Link length of {axis}", axis=AXIS), "a = a₀ + length"
-    points_to = say("the link behind joint {axis} has another length than its row: enter the length found", axis=AXIS)
+    title, formula = say("Link length of {axis}"), "a = a₀ + length"
+    points_to = say("the link behind joint {axis} has another length than its row: enter the length found")
     coefficients = (Parameter("um", unit("µm"), 500.0),)
 
 
@@ -96,8 +87,8 @@ class Twist(OfJoint):
     """The next axis is twisted against this one about their common normal, α."""
 
     row, family, mechanism = ALPHA, "twist", "link"
-    title, formula = say("Link twist of {axis}", axis=AXIS), "α = α₀ + twist"
-    points_to = say("the axes at either end of the link behind joint {axis} are twisted against each other", axis=AXIS)
+    title, formula = say("Link twist of {axis}"), "α = α₀ + twist"
+    points_to = say("the axes at either end of the link behind joint {axis} are twisted against each other")
     coefficients = (Parameter("arcsec", unit("″"), 400.0),)
 
 
@@ -105,8 +96,8 @@ class Offset(OfJoint):
     """The next axis lies farther along this one, d; of a prismatic joint its zero."""
 
     row, family, mechanism = D, "offset", "link"
-    title, formula = say("Link offset of {axis}", axis=AXIS), "d = d₀ + offset"
-    points_to = say("the offset along axis {axis} is another than its row has: enter the one found", axis=AXIS)
+    title, formula = say("Link offset of {axis}"), "d = d₀ + offset"
+    points_to = say("the offset along axis {axis} is another than its row has: enter the one found")
     coefficients = (Parameter("um", unit("µm"), 500.0),)
 
 
@@ -114,8 +105,8 @@ class Parallelism(OfJoint):
     """Two nominally parallel axes enclose an angle about the direction that no twist has (Hayati's β)."""
 
     row, family, mechanism = BETA, "parallelism", "link"
-    title, formula = say("Parallelism of {axis} and the next axis", axis=AXIS), "β = β₀ + parallelism"
-    points_to = say("axis {axis} and the next are not parallel: enter β, or check the bearings' seats", axis=AXIS)
+    title, formula = say("Parallelism of {axis} and the next axis"), "β = β₀ + parallelism"
+    points_to = say("axis {axis} and the next are not parallel: enter β, or check the bearings' seats")
     coefficients = (Parameter("arcsec", unit("″"), 400.0),)
 
 
@@ -123,72 +114,66 @@ class Gain(OfJoint):
     """A prismatic joint that goes farther than it reads, in proportion."""
 
     row, family = D, "gain"
-    title, formula = say("Gain of joint {axis}", axis=AXIS), "d = reading·(1 + gain) + d₀"
-    points_to = say("joint {axis} goes another way than it reads: check the lead or the scale of its drive", axis=AXIS)
+    title, formula = say("Gain of joint {axis}"), "d = reading·(1 + gain) + d₀"
+    points_to = say("joint {axis} goes another way than it reads: check the lead or the scale of its drive")
     coefficients = (Parameter("ppm", unit("ppm"), 300.0),)
 
     def amount(self, points: Points, shape: Sequence[float]) -> Floats:
         return PPM * points.readings[self.axis]
 
 
+def _wave(sd: float) -> tuple[Parameter, tuple[Parameter, ...]]:
+    """An amplitude, and the sine and cosine that it is of."""
+    parts = (Parameter(f"{part}_arcsec", unit("″"), sd) for part in ("sine", "cosine"))
+    return Parameter("amplitude_arcsec", unit("″"), sd, say("amplitude")), tuple(parts)
+
+
 class Eccentricity(Harmonic, OfJoint):
     """An encoder's disc turns about another point than its middle."""
 
-    family, title = "eccentricity", say("Eccentric encoder of joint {axis}", axis=AXIS)
+    family, title = "eccentricity", say("Eccentric encoder of joint {axis}")
     formula = "θ = reading + θ₀ + A·sin(q + φ)"
-    points_to = say(
-        "the disc of the encoder of joint {axis} is eccentric: centre it, or read it from two sides", axis=AXIS
-    )
-    amplitude = Parameter("amplitude_arcsec", unit("″"), 60.0, say("amplitude"))
+    points_to = say("the disc of the encoder of joint {axis} is eccentric: centre it, or read it from two sides")
+    amplitude, coefficients = _wave(60.0)
     order: ClassVar[int] = 1
 
-    def __init__(self, joint: str) -> None:
-        sd = self.amplitude.prior_sd
-        self.coefficients = tuple(Parameter(f"{part}_arcsec", unit("″"), sd) for part in ("sine", "cosine"))
-        super().__init__(joint)
+    def turns(self, points: Points, shape: Sequence[float]) -> Floats:
+        return self.order * np.radians(points.readings[self.axis])
 
     def amount(self, points: Points, shape: Sequence[float]) -> Floats:
-        turns = self.order * self.angle(points)
+        turns = self.turns(points, shape)
         return ARCSECOND * np.column_stack([np.sin(turns), np.cos(turns)])
 
 
 class Ovality(Eccentricity):
     """A second harmonic: an oval or tilted disc of an encoder, or a bent shaft."""
 
-    family, title = "ovality", say("Second harmonic of the encoder of joint {axis}", axis=AXIS)
+    family, title = "ovality", say("Second harmonic of the encoder of joint {axis}")
     formula = "θ = reading + θ₀ + A·sin(2q + φ)"
-    points_to = say(
-        "the encoder of joint {axis} errs twice a turn: its disc is tilted or oval, or its shaft bent", axis=AXIS
-    )
-    amplitude = Parameter("amplitude_arcsec", unit("″"), 30.0, say("amplitude"))
+    points_to = say("the encoder of joint {axis} errs twice a turn: its disc is tilted or oval, or its shaft bent")
+    amplitude, coefficients = _wave(30.0)
     order = 2
 
 
 class GearError(Eccentricity):
     """An error that repeats with the period λ of a gear: the wave generator of a strain wave gear, the pinion of another."""
 
-    family, title, tier = "gear", say("Transmission error of joint {axis}", axis=AXIS), FURTHER
+    family, title, tier = "gear", say("Transmission error of joint {axis}"), FURTHER
     formula = "θ = reading + θ₀ + A·sin(360°·q/λ + φ)"
-    points_to = say("the gear of joint {axis} errs with its own period: check its mounting and wear", axis=AXIS)
-    amplitude = Parameter("amplitude_arcsec", unit("″"), 30.0, say("amplitude"))
+    points_to = say("the gear of joint {axis} errs with its own period: check its mounting and wear")
+    amplitude, coefficients = _wave(30.0)
+    shape = (Shape("period_deg", unit("°"), 1.0, 90.0, "{a}", say("period")),)
 
-    def __init__(self, joint: str) -> None:
-        super().__init__(joint)
-        self.shape = (Shape("period_deg", unit("°"), 1.0, 90.0, joint, say("period")),)
-
-    def amount(self, points: Points, shape: Sequence[float]) -> Floats:
-        turns = 2 * np.pi * points.readings[self.axis] / shape[0]
-        return ARCSECOND * np.column_stack([np.sin(turns), np.cos(turns)])
+    def turns(self, points: Points, shape: Sequence[float]) -> Floats:
+        return 2 * np.pi * points.readings[self.axis] / shape[0]
 
 
 class Slack(OfJoint):
     """The joint stands behind its reading by half the play of its gear, on the side that it came from."""
 
-    family, title = "slack", say("Play of joint {axis}", axis=AXIS)
+    family, title = "slack", say("Play of joint {axis}")
     formula = "θ = reading + θ₀ + ½·gap·approach"
-    points_to = say(
-        "the gear of joint {axis} has play: check its preload and wear, and approach from one side", axis=AXIS
-    )
+    points_to = say("the gear of joint {axis} has play: check its preload and wear, and approach from one side")
     coefficients = (Parameter("gap_arcsec", unit("″"), 100.0),)
     columns = ("approach_{a}",)
 
@@ -199,11 +184,10 @@ class Slack(OfJoint):
 class Sag(OfJoint):
     """A joint yields to the load at the tool, whose lever about the joint's axis u is u·((tool − origin) × down)."""
 
-    family, title = "sag", say("Sag of joint {axis} under the load", axis=AXIS)
+    family, title = "sag", say("Sag of joint {axis} under the load")
     formula = "θ = reading + θ₀ + c·u·((tool − origin) × down)"
     points_to = say(
-        "joint {axis} yields to the weight that it carries: check its bearings and gear, or compensate by pose",
-        axis=AXIS,
+        "joint {axis} yields to the weight that it carries: check its bearings and gear, or compensate by pose"
     )
     coefficients = (Parameter("arcsec_per_m", unit("″/m"), 1000.0),)
 
@@ -212,7 +196,7 @@ class Sag(OfJoint):
         return pose.tool
 
     def amount(self, points: Points, shape: Sequence[float]) -> Floats:
-        pose = _posed(points)
+        pose = arm_of(points).posed(points.columns)
         origin, axis = pose.origins[:, self.index, THETA], pose.axes[:, self.index, THETA]
         lever = np.einsum("ni,ni->n", axis, np.cross(self.place(pose) - origin, -arm_of(points).up))
         return np.asarray(ARCSECOND / METRE * lever)
@@ -221,7 +205,7 @@ class Sag(OfJoint):
 class SagOfLinks(Sag):
     """A joint yields to the weight of the links beyond it, taken where the origins of the joints beyond are on average."""
 
-    family, title = "sag_links", say("Sag of joint {axis} under the links beyond", axis=AXIS)
+    family, title = "sag_links", say("Sag of joint {axis} under the links beyond")
     formula = "θ = reading + θ₀ + c·u·((mean of the joints beyond − origin) × down)"
 
     def place(self, pose: ArmPose) -> Floats:

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from cmm_uq.base.messages import say
-from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.physics.effect import CommonSize, Effect, Harmonic, Parameter
 from cmm_uq.machine.physics.effects.own_errors import FaultyArtefact, OwnFault, means_of
@@ -18,6 +18,26 @@ KELVIN = Parameter("k", unit("K"), 1.0)
 TURNED = "turned_deg"  # column: by how much a sphere was turned about Z against its first set-up
 # degrees and orders of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1
 HARMONICS = tuple((degree, order) for degree in (2, 3, 4, 5) for order in range(-degree, degree + 1))
+NORMAL = ("nx", "ny", "nz")
+
+
+def normals_of(points: Points) -> Floats:
+    """Outward unit normals (n, 3), as recorded."""
+    return np.column_stack([points.column(name) for name in NORMAL])
+
+
+def lobes_of(normals: Floats, count: int, turned: Floats | float = 0.0) -> Floats:
+    """(n, 3, 2) along normals (n, 3), for A·cos φ and A·sin φ of A·cos(count·θ + φ), θ about Z less ``turned``, rad."""
+    angle = count * (np.arctan2(normals[:, 1], normals[:, 0]) - turned)
+    lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
+    return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :])
+
+
+class OfDirections(CommonSize):
+    """Spherical harmonics of mean square one, by their root mean square over the sphere."""
+
+    def errors(self, coefficients: Floats) -> Floats:
+        return np.asarray(coefficients * np.sqrt(coefficients.shape[-1]), dtype=np.float64)
 
 
 class ArtefactTemperature(OwnFault):
@@ -136,19 +156,17 @@ class OwnLobes(OwnFault, Harmonic):
     points_to = say("the sphere is not round: turn it about its stem and probe it again; what turns with it is its own")
     amplitude = Parameter("amplitude_um", unit("µm"), 1.0)
     coefficients = (Parameter("cosine_um", unit("µm"), 1.0), Parameter("sine_um", unit("µm"), 1.0))
-    columns = ("nx", "ny", "nz")
+    columns = NORMAL
 
     def belongs_to(self, points: Points) -> bool:
         return self.owner is not None
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         self.whose()
-        angle = 3 * (np.arctan2(points.column("ny"), points.column("nx")) - _turned(points))
-        lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
-        return np.asarray(-MICROMETRE * _normals(points)[:, :, None] * lobes[:, None, :])
+        return -lobes_of(normals_of(points), 3, _turned(points))
 
 
-class OwnForm(OwnFault, CommonSize):
+class OwnForm(OwnFault, OfDirections):
     """The sphere itself is not round: spherical harmonics of the degrees 2 to 5, which turn with it."""
 
     name, title = "artefact_form", say("Form of the sphere itself")
@@ -156,7 +174,7 @@ class OwnForm(OwnFault, CommonSize):
     points_to = say("the sphere's form deviates: turn it about its stem, or take another ball, and probe it again")
     coefficients = (Parameter("um", unit("µm"), 1.0),)
     size = Parameter("rms_um", unit("µm"), 1.0)
-    columns = ("nx", "ny", "nz")
+    columns = NORMAL
 
     def belongs_to(self, points: Points) -> bool:
         return self.owner is not None
@@ -164,12 +182,9 @@ class OwnForm(OwnFault, CommonSize):
     def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         return tuple(Parameter(f"c{degree}_{order}_um", unit("µm"), owner.size) for degree, order in HARMONICS)
 
-    def errors(self, coefficients: Floats) -> Floats:
-        return np.asarray(coefficients * np.sqrt(coefficients.shape[-1]), dtype=np.float64)
-
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         self.whose()
-        normals = _normals(points)
+        normals = normals_of(points)
         return -MICROMETRE * normals[:, :, None] * harmonics(normals, _turned(points))[:, None, :]
 
 
@@ -203,10 +218,6 @@ def _flat(owner: FaultyArtefact, points: Points) -> tuple[Floats, Floats]:
     poses = owner.body.poses(points)
     across = (places @ np.column_stack([u, v]))[poses.node] / owner.body.extent
     return np.asarray(poses.rotation @ normal), np.asarray(across)
-
-
-def _normals(points: Points) -> Floats:
-    return np.column_stack([points.column(f"n{a}") for a in AXES])
 
 
 def _turned(points: Points) -> Floats:

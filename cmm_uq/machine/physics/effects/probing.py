@@ -12,25 +12,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
-from cmm_uq.machine.physics.effect import FURTHER, CommonSize, Effect, Harmonic, Parameter
+from cmm_uq.machine.physics.effect import FURTHER, Effect, Harmonic, Parameter
 from cmm_uq.machine.physics.effects.drives import travel
-from cmm_uq.machine.physics.effects.own_states import HARMONICS, harmonics
+from cmm_uq.machine.physics.effects.own_states import HARMONICS, NORMAL, OfDirections, harmonics, lobes_of, normals_of
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
 from cmm_uq.machine.physics.kinematics import euler_313
-from cmm_uq.machine.physics.words import SENSE, SIZE
+from cmm_uq.machine.physics.words import say
 
-NORMAL = ("nx", "ny", "nz")
 TIP = tuple(f"tip_{a}_mm" for a in AXES)
 REFERENCE_LENGTH = 100.0  # mm; the length of stylus that bending is stated for
 _MILLISECOND = 1e-3
-
-
-def normals_of(points: Points) -> Floats:
-    """Outward unit normals (n, 3), as recorded."""
-    return np.column_stack([points.column(name) for name in NORMAL])
 
 
 class ProbeRadius(Effect):
@@ -39,7 +33,7 @@ class ProbeRadius(Effect):
     name, title = "probe_radius", say("Effective stylus radius")
     formula, mechanism = "true surface point = indicated + r·n", "probe"
     points_to = say("the effective stylus radius is wrong: qualify the probe again")
-    means = say("probed surfaces are indicated {size} too {wrong}", size=SIZE, wrong=SENSE)
+    means = say("probed surfaces are indicated {size} too {wrong}")
     sense = (say("deep, inside the material"), say("early, outside the material"))
     coefficients = (Parameter("um", unit("µm"), 10.0),)
     columns = NORMAL
@@ -57,7 +51,7 @@ class ProbeLobing(Harmonic):
     name, title = "probe_lobing", say("Lobing of the probe")
     formula, mechanism = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)", "probe"
     points_to = say("the probe's pre-travel has three lobes: qualify it in more directions")
-    means: Text = say("the probing error swings to either side by {size}, three times in a turn about Z", size=SIZE)
+    means: Text = say("the probing error swings to either side by {size}, three times in a turn about Z")
     amplitude = Parameter("amplitude_um", unit("µm"), 5.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 5.0), Parameter("sine_um", unit("µm"), 5.0))
     columns = NORMAL
@@ -75,13 +69,10 @@ class ProbeLobing(Harmonic):
             )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        normals = normals_of(points)
-        angle = self.count * np.arctan2(normals[:, 1], normals[:, 0])
-        lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
-        return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)
+        return lobes_of(normals_of(points), self.count)
 
 
-class ProbeMap(CommonSize):
+class ProbeMap(OfDirections):
     """A probing error of its own in every direction: spherical harmonics of the degrees 2 to 5 (VDI/VDE 2617-2)."""
 
     name, title = "probe_map", say("Probing error by direction")
@@ -92,9 +83,6 @@ class ProbeMap(CommonSize):
     size = Parameter("rms_um", unit("µm"), 2.0)
     coefficients = tuple(Parameter(f"c{degree}_{order}_um", unit("µm"), 2.0) for degree, order in HARMONICS)
     columns, tier = NORMAL, FURTHER
-
-    def errors(self, coefficients: Floats) -> Floats:
-        return np.asarray(coefficients * np.sqrt(coefficients.shape[-1]), dtype=np.float64)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         normals = normals_of(points)
@@ -134,7 +122,7 @@ class ArtefactSag(Effect):
     name, title = "artefact_sag", say("Sag of the artefact")
     formula, mechanism = "true length = length − s·cos²(elevation above the table)", "artefact"
     points_to = say("the artefact sags or its supports are not at the right points")
-    means = say("lying level the artefact is {size} {wrong} than upright", size=SIZE, wrong=SENSE)
+    means = say("lying level the artefact is {size} {wrong} than upright")
     sense = (say("shorter"), say("longer"))
     coefficients = (Parameter("um", unit("µm"), 10.0),)
 

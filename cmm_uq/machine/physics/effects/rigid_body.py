@@ -10,12 +10,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 from cmm_uq.machine.physics.effect import Effect, Family, Nonparametric, OfAxis, Parameter, along
 from cmm_uq.machine.physics.kinematics import KinematicChain, carried_offset
-from cmm_uq.machine.physics.words import AXIS, OTHER, SENSE, SIDE, SIZE
+from cmm_uq.machine.physics.words import AXIS, OTHER, say
 
 # of each plane the axis along which a point moves, and the one that leans, by whose reading it moves
 LEANING = MappingProxyType({"xy": ("x", "y"), "yz": ("y", "z"), "zx": ("x", "z")})
@@ -25,17 +25,14 @@ PLANE, MOVED, LEVER = Verbatim("‹plane›"), Verbatim("‹moved›"), Verbatim
 class Scale(OfAxis):
     """Linear scale error."""
 
-    family, title = "scale", say("Scale error of {axis}", axis=AXIS)
+    family, title = "scale", say("Scale error of {axis}")
     formula, mechanism = "e_a = s · a", "scale"
     points_to = say("the scale or its compensation: check the linear compensation of this axis")
-    means = say("lengths along {axis} are indicated {size} too {wrong}", axis=AXIS, size=SIZE, wrong=SENSE)
+    means = say("lengths along {axis} are indicated {size} too {wrong}")
     sense = (say("short"), say("long"))
     everywhere = True
     coefficients = (Parameter("ppm", unit("ppm"), 300.0),)
-
-    def __init__(self, axis: str) -> None:
-        super().__init__(axis)
-        self.imitated_by = (Nonparametric(f"{axis}_mm", axis), Nonparametric("time_s", axis, scale=True))
+    imitated_by = (Nonparametric("{a}_mm", "{a}"), Nonparametric("time_s", "{a}", scale=True))
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
         return PPM * points.readings[self.axis]
@@ -47,14 +44,12 @@ class Lean(Family):
     mechanism = "frame"
 
     def __init__(self, plane: str) -> None:
+        self.plane, (self.moved, self.lever) = plane, LEANING[plane]
         super().__init__(plane)
-        self.plane = plane
-        self.moved, self.lever = LEANING[plane]
 
     def fill(self, letters: object) -> None:
-        plane = self.axis
-        moved, lever = LEANING[plane]
-        super().fill({AXIS: plane[0], OTHER: plane[1], PLANE: "–".join(plane), MOVED: moved, LEVER: lever})
+        first, second = tuple(self.axis)
+        super().fill({AXIS: first, OTHER: second, PLANE: f"{first}–{second}", MOVED: self.moved, LEVER: self.lever})
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return along(self.moved, -self.lean(points) * points.readings[self.lever])
@@ -66,9 +61,7 @@ class Squareness(Lean):
     family, title = "squareness", say("Squareness {plane}", plane=PLANE)
     formula = "xy: e_x = −S·y; yz: e_y = −S·z; zx: e_x = −S·z"
     points_to = say("the axes are not square: adjust the guideways or the squareness in the compensation")
-    means = say(
-        "the angle between {one} and {other} is 90° {side} {size}", one=MOVED, other=LEVER, side=SIDE, size=SIZE
-    )
+    means = say("the angle between {one} and {other} is 90° {side} {size}", one=MOVED, other=LEVER)
     everywhere = True
     coefficients = (Parameter("angle_arcsec", unit("″"), 500.0),)
 
@@ -83,46 +76,35 @@ class Squareness(Lean):
 class Straightness(Family):
     """Straightness of carriage a along b as one bow over the travel T from a0."""
 
-    family, title = "straightness", say("Straightness of {axis} along {direction}", axis=AXIS, direction=OTHER)
+    family, title = "straightness", say("Straightness of {axis} along {direction}")
     formula, mechanism = "e_b = bow · (1 − (2(a − a0)/T − 1)²)", "guideway"
     points_to = say("a bowed guideway: check straightness and its compensation")
     means = say(
-        "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} {direction}",
-        axis=AXIS, size=SIZE, side=SIDE, direction=OTHER,
-    )  # fmt: skip
+        "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} {direction}"
+    )
     coefficients = (Parameter("bow_um", unit("µm"), 50.0),)
-
-    def __init__(self, axis: str, direction: str) -> None:
-        super().__init__(axis, direction)
-        self.direction, self.idealised_over = direction, axis
-        self.imitated_by = (Nonparametric(f"{axis}_mm", direction),)
+    idealised_over, imitated_by = "{a}", (Nonparametric("{a}_mm", "{b}"),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.direction, MICROMETRE * bow(points, self.axis))
+        return along(self.other, MICROMETRE * bow(points, self.axis))
 
 
 class Rotation(Family):
     """Carriage a turns about b in proportion to its travel from a0: roll, pitch or yaw."""
 
-    family, title = "rotation", say("Rotation of carriage {axis} about {about}", axis=AXIS, about=OTHER)
+    family, title = "rotation", say("Rotation of carriage {axis} about {about}")
     formula, mechanism = "e = ε × what carriage a carries, ε_b = r·(a − a0)", "guideway"
     points_to = say(
         "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"
     )
-    means = say(
-        "as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}",
-        axis=AXIS, size=SIZE, sense=SENSE, about=OTHER,
-    )  # fmt: skip
+    means = say("as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}")
     sense = (say("clockwise"), say("anticlockwise"))
     coefficients = (Parameter("arcsec_per_m", unit("″/m"), 60.0),)
-
-    def __init__(self, axis: str, about: str) -> None:
-        super().__init__(axis, about)
-        self.about, self.idealised_over = about, axis
+    idealised_over = "{a}"
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         low, _ = points.machine.travel(self.axis)
-        return turned(points, self.axis, self.about, ARCSECOND * (points.readings[self.axis] - low) / METRE)
+        return turned(points, self.axis, self.other, ARCSECOND * (points.readings[self.axis] - low) / METRE)
 
 
 def bow(points: Points, axis: str) -> Floats:

@@ -13,17 +13,17 @@ machine at C = 0. What no recording can show is no effect:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import ClassVar
+from typing import NamedTuple
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.rotary import ROTARY, Turntable
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.machine.physics.effect import FURTHER, CommonSize, Effect, Family, Harmonic, Nonparametric, Parameter
-from cmm_uq.machine.physics.words import AXIS, OTHER, SENSE, SIDE, SIZE, filled
+from cmm_uq.machine.physics.words import AXIS, OTHER, filled, say
 
 _MANY, _HIGHER = "n", np.arange(3, 13)  # orders of errors of which only the common size is known beforehand
 
@@ -82,17 +82,10 @@ class OfItsAxis(OfTable):
 class TableLocation(OfItsAxis):
     """The axis of the table stands beside where it is taken to stand."""
 
-    family, title = "rotary_location", say("Location of axis {axis} along {direction}", axis=AXIS, direction=OTHER)
+    family, title = "rotary_location", say("Location of axis {axis} along {direction}")
     formula = "e = −(1 − R)·o; c_x: o = EX0C along X"
-    points_to = say(
-        "the axis of table {axis} is not where the controller takes it to be: calibrate its location", axis=AXIS
-    )
-    means = say(
-        "the axis of the table stands {size} further towards {side} {direction} than it is taken to",
-        size=SIZE,
-        side=SIDE,
-        direction=OTHER,
-    )
+    points_to = say("the axis of table {axis} is not where the controller takes it to be: calibrate its location")
+    means = say("the axis of the table stands {size} further towards {side} {direction} than it is taken to")
     coefficients = (Parameter("um", unit("µm"), 50.0),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -102,15 +95,10 @@ class TableLocation(OfItsAxis):
 class TableTilt(OfItsAxis):
     """The axis of the table is not parallel to that of the machine."""
 
-    family, title = "rotary_tilt", say("Tilt of axis {axis} about {about}", axis=AXIS, about=OTHER)
+    family, title = "rotary_tilt", say("Tilt of axis {axis} about {about}")
     formula = "e = −((1 − R)·a) × r; c_x: a = EA0C about X"
-    points_to = say("the axis of table {axis} is tilted: level the table, or calibrate its direction", axis=AXIS)
-    means = say(
-        "the axis of the table is turned {sense} about {about} by {size}, seen along plus",
-        sense=SENSE,
-        about=OTHER,
-        size=SIZE,
-    )
+    points_to = say("the axis of table {axis} is tilted: level the table, or calibrate its direction")
+    means = say("the axis of the table is turned {sense} about {about} by {size}, seen along plus")
     sense = (say("clockwise"), say("anticlockwise"))
     coefficients = (Parameter("angle_arcsec", unit("″"), 100.0),)
 
@@ -118,50 +106,58 @@ class TableTilt(OfItsAxis):
         return -ARCSECOND * self.about(points, self.change(points))[:, :, None]
 
 
-class TableMotion(OfTable):
-    """How the table moves as it turns: along axes, or about them."""
+class Motion(NamedTuple):
+    """How a table errs as it turns: along axes of the machine, or about them."""
 
+    family: str
     error: Text  # its name, without direction and order
     remedy: Text
-    turns: ClassVar[bool] = False
-    across: ClassVar[bool] = False  # of its own axis, whether it moves across that
+    of_order: str  # formula of one order of the angle
+    of_all: str = ""  # of all higher ones
+    across: bool = False  # of its own axis, whether it moves across that
+    turns: bool = False
+
+
+class TableMotion(OfTable):
     tier = FURTHER
 
-    def __init__(self, axis: str, *others: str) -> None:
+    def __init__(self, motion: Motion, axis: str, *others: str) -> None:
         own, direction = AXES.index(ROTARY[axis]), others[0]
-        each = [(own + 1) % 3, (own + 2) % 3] if self.across else [own]
+        self.motion, self.family, self.order = motion, motion.family, others[-1]
+        self.formula = motion.of_all if self.order == _MANY else motion.of_order
+        each = [(own + 1) % 3, (own + 2) % 3] if motion.across else [own]
         self.parts = tuple(i for i in each if direction not in ROTARY.values() or direction == AXES[i])
-        self.order = others[-1]
         super().__init__(axis, *others)
-        if not self.turns:
+        if not motion.turns:
             self.imitated_by = tuple(Nonparametric(self.columns[0], AXES[i]) for i in self.parts)
 
     def fill(self, letters: Mapping[Text, str]) -> None:
-        error = filled(self.error, {AXIS: Verbatim(letters[AXIS].upper())})
-        if self.across and len(self.parts) == 1:
+        error = filled(self.motion.error, {AXIS: Verbatim(letters[AXIS].upper())})
+        if self.motion.across and len(self.parts) == 1:
             direction = Verbatim(letters[OTHER].upper())
             along = say("{error} along {direction}", error=error, direction=direction)
-            error = say("{error} about {direction}", error=error, direction=direction) if self.turns else along
+            error = say("{error} about {direction}", error=error, direction=direction) if self.motion.turns else along
         order = Verbatim(f"{_HIGHER[0]}–{_HIGHER[-1]}" if self.order == _MANY else self.order)
         self.title = say("{error}, order {order}", error=error, order=order)
-        self.points_to = say("{error:small}, order {order}: {remedy}", error=error, order=order, remedy=self.remedy)
+        remedy = self.motion.remedy
+        self.points_to = say("{error:small}, order {order}: {remedy}", error=error, order=order, remedy=remedy)
 
     def moved(self, points: Points, part: int) -> Floats:
         """(n, 3) mm by which one of its parts moves what stands on the table, of 1 µm or 1″."""
         vectors = along_axis(points, part)
-        return ARCSECOND * self.about(points, vectors) if self.turns else MICROMETRE * vectors
+        return ARCSECOND * self.about(points, vectors) if self.motion.turns else MICROMETRE * vectors
 
     def parameter(self, name: str, size: float) -> Parameter:
-        of, own = ("arcsec", unit("″")) if self.turns else ("um", unit("µm"))
+        of, own = ("arcsec", unit("″")) if self.motion.turns else ("um", unit("µm"))
         return Parameter(f"{name}_{of}", own, size, say("amplitude") if name == "amplitude" else NOTHING)
 
 
 class TableHarmonic(TableMotion, Harmonic):
     """A motion of one order of the angle; of the first order across the axis in a circle against the turn."""
 
-    def __init__(self, axis: str, *others: str) -> None:
-        super().__init__(axis, *others)
-        self.amplitude = self.parameter("amplitude", 5.0)  # type: ignore[misc]
+    def __init__(self, motion: Motion, axis: str, *others: str) -> None:
+        super().__init__(motion, axis, *others)
+        self.amplitude = self.parameter("amplitude", 5.0)
         self.coefficients = tuple(self.parameter(name, 5.0) for name in ("cosine", "sine"))
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
@@ -175,8 +171,8 @@ class TableHarmonic(TableMotion, Harmonic):
 class TableFunction(TableMotion, CommonSize):
     """A motion of all higher orders of the angle, each smaller by its order: a function of no particular form."""
 
-    def __init__(self, axis: str, *others: str) -> None:
-        super().__init__(axis, *others)
+    def __init__(self, motion: Motion, axis: str) -> None:
+        super().__init__(motion, axis, _MANY)
         self.size = self.parameter("rms", 3.0)
         share = self.size.prior_sd / np.sqrt(np.sum(1.0 / _HIGHER**2))
         self.coefficients = tuple(
@@ -202,83 +198,40 @@ def _waves(angle: Floats) -> Floats:
     return np.stack([np.cos(each), np.sin(each)], axis=2).reshape(len(angle), -1)
 
 
-class _Radial(TableMotion):
-    error, across = say("Radial error of table {axis}", axis=AXIS), True
-    remedy = say("its bearing runs out: check bearing and preload")
-
-
-class _Axial(TableMotion):
-    error = say("Axial error of table {axis}", axis=AXIS)
-    remedy = say("its axial bearing runs out: check its races and their seat")
-
-
-class _Tilt(TableMotion):
-    error, across, turns = say("Tilt error of table {axis}", axis=AXIS), True, True
-    remedy = say("it wobbles: check the axial bearing, and how evenly the table is loaded")
-
-
-class _Angular(TableMotion):
-    error, turns = say("Angular positioning error of table {axis}", axis=AXIS), True
-    remedy = say("its encoder is beside its axis (order 1) or out of round: centre it, or compensate its positions")
-
-
-class RadialHarmonic(_Radial, TableHarmonic):
-    """The table moves across its axis as it turns: in a circle against its turn (1), or along one axis of the machine."""
-
-    family = "rotary_radial"
-    formula = "e = −E; c_1: EXC = A·cos(C + φ), EYC = −A·sin(C + φ); c_x_2: EXC = A·cos(2C + φ)"
-
-
-class AxialHarmonic(_Axial, TableHarmonic):
-    """The table moves along its axis as it turns."""
-
-    family, formula = "rotary_axial", "e = −E; c_2: EZC = A·cos(2C + φ)"
-
-
-class TiltHarmonic(_Tilt, TableHarmonic):
-    """The table tilts as it turns: in a circle against its turn (1), or about one axis of the machine."""
-
-    family = "rotary_wobble"
-    formula = "e = −ε × r; c_1: EAC = A·cos(C + φ), EBC = −A·sin(C + φ); c_x_2: EAC = A·cos(2C + φ)"
-
-
-class AngularHarmonic(_Angular, TableHarmonic):
-    """The table stands at another angle than it reads; of the first order as of an encoder beside the axis."""
-
-    family, formula = "rotary_positioning", "e = −ε × r; c_1: ECC = A·cos(C + φ)"
-
-
-class RadialFunction(_Radial, TableFunction):
-    """The table moves across its axis as any function of its angle, of the orders 3 to 12."""
-
-    family, formula = "rotary_radial", "e = −E, EXC and EYC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"
-
-
-class AxialFunction(_Axial, TableFunction):
-    """The table moves along its axis as any function of its angle, of the orders 3 to 12."""
-
-    family, formula = "rotary_axial", "e = −E, EZC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"
-
-
-class AngularFunction(_Angular, TableFunction):
-    """The table stands at another angle than it reads, by any function of it, of the orders 3 to 12."""
-
-    family, formula = "rotary_positioning", "e = −ε × r, ECC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"
+# across its axis as it turns: in a circle against its turn (1), or along one axis of the machine
+RADIAL = Motion(
+    "rotary_radial", say("Radial error of table {axis}"), say("its bearing runs out: check bearing and preload"),
+    "e = −E; c_1: EXC = A·cos(C + φ), EYC = −A·sin(C + φ); c_x_2: EXC = A·cos(2C + φ)",
+    "e = −E, EXC and EYC = Σ cosine_k·cos(kC) + sine_k·sin(kC)", across=True,
+)  # fmt: skip
+AXIAL = Motion(
+    "rotary_axial", say("Axial error of table {axis}"),
+    say("its axial bearing runs out: check its races and their seat"),
+    "e = −E; c_2: EZC = A·cos(2C + φ)", "e = −E, EZC = Σ cosine_k·cos(kC) + sine_k·sin(kC)",
+)  # fmt: skip
+# in a circle against its turn (1), or about one axis of the machine
+TILT = Motion(
+    "rotary_wobble", say("Tilt error of table {axis}"),
+    say("it wobbles: check the axial bearing, and how evenly the table is loaded"),
+    "e = −ε × r; c_1: EAC = A·cos(C + φ), EBC = −A·sin(C + φ); c_x_2: EAC = A·cos(2C + φ)", across=True, turns=True,
+)  # fmt: skip
+# at another angle than it reads; of the first order as of an encoder beside the axis
+ANGULAR = Motion(
+    "rotary_positioning", say("Angular positioning error of table {axis}"),
+    say("its encoder is beside its axis (order 1) or out of round: centre it, or compensate its positions"),
+    "e = −ε × r; c_1: ECC = A·cos(C + φ)", "e = −ε × r, ECC = Σ cosine_k·cos(kC) + sine_k·sin(kC)", turns=True,
+)  # fmt: skip
 
 
 class TablePlay(OfTable):
     """The table stands at another angle when it comes from the other side."""
 
-    family, title = "rotary_play", say("Play of table {axis}", axis=AXIS)
+    family, title = "rotary_play", say("Play of table {axis}")
     formula = "e = −ε × r, ECC = ½·gap·c_approach"
-    points_to = say(
-        "the drive of table {axis} has play, or its encoder sits on the drive: check worm, belt and brake", axis=AXIS
-    )
+    points_to = say("the drive of table {axis} has play, or its encoder sits on the drive: check worm, belt and brake")
     means = say(
         "at the same reading the table is turned {size} further towards {side} when it comes from minus than when it comes "
-        "from plus",
-        size=SIZE,
-        side=SIDE,
+        "from plus"
     )
     coefficients = (Parameter("gap_arcsec", unit("″"), 10.0),)
     columns, tier = ("{a}_deg", "{a}_approach"), FURTHER
@@ -295,11 +248,10 @@ def _of(axis: str) -> Iterator[Effect]:
     across = [a for a in AXES if a != ROTARY[axis]]
     yield from (TableLocation(axis, a) for a in across)
     yield from (TableTilt(axis, a) for a in across)
-    yield from (AngularHarmonic(axis, order) for order in "12")
-    yield from (RadialHarmonic(axis, *each) for each in (("1",), *((a, "2") for a in across)))
-    yield from (AxialHarmonic(axis, order) for order in "12")
-    yield from (TiltHarmonic(axis, *each) for each in (("1",), *((a, "2") for a in across)))
-    yield from (each(axis, _MANY) for each in (AngularFunction, RadialFunction, AxialFunction))
+    in_each = (("1",), *((a, "2") for a in across))
+    for motion in (ANGULAR, RADIAL, AXIAL, TILT):
+        yield from (TableHarmonic(motion, axis, *each) for each in (in_each if motion.across else "12"))
+    yield from (TableFunction(motion, axis) for motion in (ANGULAR, RADIAL, AXIAL))
     yield TablePlay(axis)
 
 

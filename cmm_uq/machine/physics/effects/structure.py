@@ -6,16 +6,15 @@ and its local deviations are those of ISO 230-1, reversal spikes those of ISO 23
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.machine.physics.effect import FURTHER, Family, Nonparametric, OfAxis, Parameter, Shape, along
 from cmm_uq.machine.physics.effects.rigid_body import bow, turned
-from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SIDE, SIZE
+from cmm_uq.machine.physics.words import AXIS, OTHER, say
 
 _WEAR = 1 / 12  # of the travel, standard deviation of the place where a guideway is worn
 _TRIED = 19  # places that are tried
@@ -30,40 +29,33 @@ def place(points: Points, axis: str) -> Floats:
 class Bowl(Family):
     """A surface that two carriages run on, dished: most in the middle of both travels, nothing at their ends."""
 
-    family, title = "bowl", say("Dished surface below {axis} and {other}", axis=AXIS, other=OTHER)
+    family, title = "bowl", say("Dished surface below {axis} and {other}")
     formula = "xy: e_z, yz: e_x, zx: e_y = bow·(1 − (2(a − a0)/T_a − 1)²)·(1 − (2(b − b0)/T_b − 1)²)"
     mechanism = "guideway"
     points_to = say(
         "the surface that carries {axis} and {other} is dished: check its flatness and its supports; tables of single axes "
-        "cannot correct it, a grid over both can",
-        axis=AXIS,
-        other=OTHER,
+        "cannot correct it, a grid over both can"
     )
     coefficients = (Parameter("bow_um", unit("µm"), 20.0),)
     tier = FURTHER
 
-    def __init__(self, plane: str) -> None:
-        super().__init__(plane)
-        self.plane_of, (self.across,) = plane, set(AXES) - set(plane)
-
-    def fill(self, letters: Mapping[Text, str]) -> None:
-        super().fill({AXIS: self.axis[0], OTHER: self.axis[1]})
+    def fill(self, letters: object) -> None:
+        super().fill(dict(zip((AXIS, OTHER), self.axis, strict=True)))
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        bows = [bow(points, axis) for axis in self.plane_of]
-        return along(self.across, MICROMETRE * bows[0] * bows[1])
+        (across,), (one, other) = set(AXES) - set(self.axis), (bow(points, axis) for axis in self.axis)
+        return along(across, MICROMETRE * one * other)
 
 
 class GuidewayTwist(Family):
     """What a carriage runs on, held at both ends, twists: the carriage rolls most in the middle of its travel."""
 
-    family, title = "twist", say("Twist of the beam or bed of {axis}", axis=AXIS)
+    family, title = "twist", say("Twist of the beam or bed of {axis}")
     formula = "e = ε × what carriage a carries, ε_a = twist·(1 − (2(a − a0)/T − 1)²)"
     mechanism = "guideway"
     points_to = say(
         "what carriage {axis} runs on twists: check the supports of the bed, how the beam is held, and the ram's "
-        "counterbalance",
-        axis=AXIS,
+        "counterbalance"
     )
     coefficients = (Parameter("twist_arcsec", unit("″"), 10.0),)
     tier = FURTHER
@@ -75,12 +67,11 @@ class GuidewayTwist(Family):
 class RamSag(Family):
     """A ram that reaches out along a sags under the load at its end: a cantilever, F·L³/(3·E·I)."""
 
-    family, title = "ram_sag", say("Sag of the ram along {axis} under load", axis=AXIS)
+    family, title = "ram_sag", say("Sag of the ram along {axis} under load")
     formula, mechanism = "e_z = −s·load·((a − a0)/T)³", "frame"
     points_to = say(
         "the ram sags under what it carries, the more the farther {axis} reaches out: take a lighter head or stylus, or "
-        "compensate by reach and load",
-        axis=AXIS,
+        "compensate by reach and load"
     )
     coefficients = (Parameter("um_per_kg", unit("µm/kg"), 5.0),)
     columns, tier = ("load_kg",), FURTHER
@@ -93,10 +84,7 @@ class _AtOnePlace(Family):
     """What is at one place of the travel."""
 
     tier = FURTHER
-
-    def __init__(self, axis: str, *others: str) -> None:
-        super().__init__(axis, *others)
-        self.shape = (Shape("at_part", unit("1"), 0.05, 0.95, what=say("place in the travel"), even=True),)
+    shape = (Shape("at_part", unit("1"), 0.05, 0.95, what=say("place in the travel"), even=True),)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
         yield from ((float(at),) for at in np.linspace(0.05, 0.95, _TRIED))
@@ -105,71 +93,45 @@ class _AtOnePlace(Family):
 class Wear(_AtOnePlace):
     """A guideway worn or dented at one place, where the machine works most."""
 
-    family, title = "wear", say("Local wear of the guideway of {axis} along {direction}", axis=AXIS, direction=OTHER)
+    family, title = "wear", say("Local wear of the guideway of {axis} along {direction}")
     formula, mechanism = "e_b = depth·exp(−½((a − at)/(T/12))²)", "guideway"
     points_to = say(
         "the guideway of {axis} is worn or dented at one place: clean it, look at it and at the bearings there, and "
-        "compensate straightness along {direction} by a fine table until it is mended",
-        axis=AXIS,
-        direction=OTHER,
+        "compensate straightness along {direction} by a fine table until it is mended"
     )
-    means = say(
-        "as {axis} passes {where} of its travel, the probe stands {size} further towards {side} {direction}",
-        axis=AXIS,
-        where=SECOND,
-        size=SIZE,
-        side=SIDE,
-        direction=OTHER,
-    )
+    means = say("as {axis} passes {where} of its travel, the probe stands {size} further towards {side} {direction}")
     coefficients = (Parameter("depth_um", unit("µm"), 10.0, say("depth")),)
-
-    def __init__(self, axis: str, direction: str) -> None:
-        super().__init__(axis, direction)
-        self.direction, self.imitated_by = direction, (Nonparametric(f"{axis}_mm", direction),)
+    imitated_by = (Nonparametric("{a}_mm", "{b}"),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        (at,) = shape
-        away = (place(points, self.axis) - at) / _WEAR
-        return along(self.direction, MICROMETRE * np.exp(-0.5 * away**2))
+        away = (place(points, self.axis) - shape[0]) / _WEAR
+        return along(self.other, MICROMETRE * np.exp(-0.5 * away**2))
 
 
-class ScaleJoint(_AtOnePlace):
+class ScaleJoint(_AtOnePlace, OfAxis):
     """Two pieces of a scale, or of a rack, that do not meet."""
 
-    family, title = "scale_joint", say("Joint in the scale of {axis}", axis=AXIS)
+    family, title = "scale_joint", say("Joint in the scale of {axis}")
     formula, mechanism = "e_a = step where a > at", "scale"
     points_to = say(
         "two pieces of the scale of {axis} do not meet: align them again there, or compensate position by a table with a "
-        "step",
-        axis=AXIS,
+        "step"
     )
-    means = say(
-        "beyond {where} of its travel {axis} stands {size} further towards {side} than it reads",
-        axis=AXIS,
-        where=SECOND,
-        size=SIZE,
-        side=SIDE,
-    )
+    means = say("beyond {where} of its travel {axis} stands {size} further towards {side} than it reads")
     coefficients = (Parameter("step_um", unit("µm"), 10.0, say("step")),)
+    imitated_by = (Nonparametric("{a}_mm", "{a}"),)
 
-    def __init__(self, axis: str) -> None:
-        super().__init__(axis)
-        self.along_motion, self.imitated_by = axis, (Nonparametric(f"{axis}_mm", axis),)
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        (at,) = shape
-        beyond = place(points, self.axis) > at
-        return along(self.axis, np.where(beyond, MICROMETRE, 0.0))
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return np.where(place(points, self.axis) > shape[0], MICROMETRE, 0.0)
 
 
 class Inertia(OfAxis):
     """What the machine bends by while it accelerates: in proportion, as long as nothing swings."""
 
-    family, title = "inertia", say("Bending of the machine as {axis} accelerates", axis=AXIS)
+    family, title = "inertia", say("Bending of the machine as {axis} accelerates")
     formula, mechanism = "e_a = k·acceleration_a", "frame"
     points_to = say(
-        "the machine bends while {axis} accelerates: lower the acceleration, or let it come to rest before a point is taken",
-        axis=AXIS,
+        "the machine bends while {axis} accelerates: lower the acceleration, or let it come to rest before a point is taken"
     )
     coefficients = (Parameter("um_s2_per_m", unit("µm·s²/m"), 10.0),)
     columns, tier = ("acceleration_{a}_m_s2",), FURTHER
@@ -181,20 +143,18 @@ class Inertia(OfAxis):
 class ReversalSpike(OfAxis):
     """After it turned round an axis sticks, and catches up within a short way."""
 
-    family, title = "reversal_spike", say("Reversal spike of {axis}", axis=AXIS)
+    family, title = "reversal_spike", say("Reversal spike of {axis}")
     formula, mechanism = "e_a = spike·approach_a·exp(−way since the reversal/decay)", "drive"
     points_to = say(
         "{axis} sticks when it turns round and catches up late: check friction and preload of its guideway, and the "
-        "controller's compensation of friction",
-        axis=AXIS,
+        "controller's compensation of friction"
     )
     coefficients = (Parameter("spike_um", unit("µm"), 10.0, say("spike")),)
     columns, tier = ("approach_{a}", "since_reversal_{a}_mm"), FURTHER
     shape = (Shape("decay_mm", unit("mm"), 0.05, 20.0, what=say("way")),)
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        (decay,) = shape
-        return MICROMETRE * points.column(self.columns[0]) * np.exp(-points.column(self.columns[1]) / decay)
+        return MICROMETRE * points.column(self.columns[0]) * np.exp(-points.column(self.columns[1]) / shape[0])
 
 
 EFFECTS = (

@@ -13,12 +13,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.base.messages import Text, say
+from cmm_uq.base.messages import Text
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
 from cmm_uq.machine.physics.effect import CONTRACT, FURTHER, Effect, Harmonic, OfAxis, Parameter, Shape
 from cmm_uq.machine.physics.effects.rigid_body import LEANING, Lean, turned
-from cmm_uq.machine.physics.words import AXIS, OTHER, SECOND, SENSE, SIDE, SIZE
+from cmm_uq.machine.physics.words import AXIS, say
 
 # coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible.
 EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6, say("expansion"))
@@ -32,10 +32,10 @@ _HALF_A_DAY = 12.0  # h
 class ThermalScale(OfAxis):
     """Expansion of a scale."""
 
-    family, title = "thermal_scale", say("Thermal expansion of scale {axis}", axis=AXIS)
+    family, title = "thermal_scale", say("Thermal expansion of scale {axis}")
     formula, mechanism = "e_a = α·(temp_a − 20 °C)·a", "temperature"
     points_to = say("the scale expands and its temperature is not, or wrongly, compensated")
-    means = say("the scale of {axis} expands by {size} {more} than is compensated", axis=AXIS, size=SIZE, more=SENSE)
+    means = say("the scale of {axis} expands by {size} {more} than is compensated")
     sense = (say("more"), say("less"))
     coefficients = (EXPANSION,)
     columns = ("temp_{a}_c",)
@@ -64,7 +64,7 @@ class ThermalArtefact(Expanding):
     name, title = "thermal_artefact", say("Thermal expansion of the artefact")
     formula = "length = length at 20 °C · (1 + α·(temp_artefact − 20 °C))"
     points_to = say("the artefact expands and its temperature is not, or wrongly, compensated")
-    means = say("the artefact expands by {size} {more} than is reckoned with", size=SIZE, more=SENSE)
+    means = say("the artefact expands by {size} {more} than is reckoned with")
     sense = (say("more"), say("less"))
     columns = ("temp_artefact_c",)
 
@@ -113,13 +113,12 @@ class ThermalLag(OfAxis):
     It stands beside the scale's expansion, compensated or ``thermal_scale``, which follows the thermometer (ISO/TR 16907).
     """
 
-    family, title = "thermal_lag", say("Scale of {axis} lagging behind its thermometer", axis=AXIS)
+    family, title = "thermal_lag", say("Scale of {axis} lagging behind its thermometer")
     formula = "e_a = α·(T′ − temp_a)·a, τ·dT′/dt = temp_a − T′"
     mechanism = "temperature"
     points_to = say(
         "the scale of {axis} takes on the temperature later than its thermometer: fix the thermometer to the body of the "
-        "scale, and measure when the room has been steady for longer",
-        axis=AXIS,
+        "scale, and measure when the room has been steady for longer"
     )
     coefficients, shape, columns = (EXPANSION,), (LAG,), ("temp_{a}_c", "time_s")
     tier = FURTHER
@@ -136,11 +135,10 @@ class Daily(OfAxis, Harmonic):
     Of less than half a day no cycle is to be told from a drift.
     """
 
-    family, title = "daily", say("Daily cycle of {axis}", axis=AXIS)
+    family, title = "daily", say("Daily cycle of {axis}")
     formula, mechanism = "e_a = A·sin(2π·time/24 h + φ)", "temperature"
     points_to = say(
-        "{axis} moves with the time of day: look for sun, a heating that is lowered at night, doors and shifts",
-        axis=AXIS,
+        "{axis} moves with the time of day: look for sun, a heating that is lowered at night, doors and shifts"
     )
     amplitude = Parameter("amplitude_um", unit("µm"), 10.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
@@ -157,12 +155,11 @@ class Daily(OfAxis, Harmonic):
 class DailyScale(Daily):
     """A scale that goes with the day."""
 
-    family, title = "daily_scale", say("Daily cycle of the scale of {axis}", axis=AXIS)
+    family, title = "daily_scale", say("Daily cycle of the scale of {axis}")
     formula = "e_a = s·sin(2π·time/24 h + φ)·a"
     points_to = say(
         "lengths along {axis} go with the time of day: check the temperature compensation of this scale, and look for sun "
-        "and a heating that is lowered at night",
-        axis=AXIS,
+        "and a heating that is lowered at night"
     )
     amplitude = Parameter("amplitude_ppm", unit("ppm"), 10.0, say("amplitude"))
     coefficients = (Parameter("cosine_ppm", unit("ppm"), 10.0), Parameter("sine_ppm", unit("ppm"), 10.0))
@@ -212,12 +209,13 @@ class ThermalSquareness(Lean):
     A frame of two materials. Harris 2004 table 7 looked for it, and found XY free of it and YZ, ZX by up to 4″/K.
     """
 
-    family, title = "thermal_squareness", say("Squareness {one}–{other} with temperature", one=AXIS, other=OTHER)
+    family, title = "thermal_squareness", say("Squareness {one}–{other} with temperature", one=AXIS)
     formula, mechanism = "as of squareness, with S = k·(mean of temp_x, temp_y, temp_z − 20 °C)", "temperature"
     points_to = say(
         "the angle between {one} and {other} follows the temperature of the frame: keep the machine at the temperature of its "
-        "calibration, or compensate squareness by temperature", one=AXIS, other=OTHER,
-    )  # fmt: skip
+        "calibration, or compensate squareness by temperature",
+        one=AXIS,
+    )
     coefficients = (Parameter("arcsec_per_k", unit("″/K"), 4.0),)
     columns, tier = tuple(f"temp_{a}_c" for a in AXES), FURTHER
 
@@ -229,13 +227,13 @@ class ThermalSquareness(Lean):
 class ScaleDrift(OfAxis):
     """A scale that grows with time. A room or a machine that warms steadily."""
 
-    family, title = "scale_drift", say("Scale of {axis} growing with time", axis=AXIS)
+    family, title = "scale_drift", say("Scale of {axis} growing with time")
     formula, mechanism = "e_a = r·time·a", "temperature"
     points_to = say(
         "the scale of {axis} changes steadily while the machine or the room warms or cools: measure in thermal equilibrium, "
-        "and check the temperature compensation of this scale", axis=AXIS,
-    )  # fmt: skip
-    means = say("lengths along {axis} are indicated ever {wrong}, by {size}", axis=AXIS, wrong=SENSE, size=SIZE)
+        "and check the temperature compensation of this scale"
+    )
+    means = say("lengths along {axis} are indicated ever {wrong}, by {size}")
     sense = (say("shorter"), say("longer"))
     coefficients = (Parameter("ppm_per_h", unit("ppm/h"), 5.0),)
     columns, tier = ("time_s",), FURTHER
@@ -247,16 +245,13 @@ class ScaleDrift(OfAxis):
 class Settling(OfAxis):
     """Drift that settles. What follows switching on, or a door left open."""
 
-    family, title = "settling", say("Settling of {axis}", axis=AXIS)
+    family, title = "settling", say("Settling of {axis}")
     formula, mechanism = "e_a = A·(1 − exp(−time/τ))", "temperature"
     points_to = say(
         "the zero of {axis} moves and comes to rest: let machine, probe and artefact settle longer after switching on, "
-        "setting up or an open door", axis=AXIS,
-    )  # fmt: skip
-    means = say(
-        "at the same reading {axis} moves towards {side} by {size} in all, and settles with {settling}",
-        axis=AXIS, size=SIZE, side=SIDE, settling=SECOND,
-    )  # fmt: skip
+        "setting up or an open door"
+    )
+    means = say("at the same reading {axis} moves towards {side} by {size} in all, and settles with {settling}")
     coefficients = (Parameter("um", unit("µm"), 20.0, say("way")),)
     shape, columns = (SETTLING,), ("time_s",)
     tier = FURTHER
@@ -269,16 +264,13 @@ class Settling(OfAxis):
 class ScaleSettling(OfAxis):
     """A scale that settles. An axis warmed by its motor, an air supply that was switched on."""
 
-    family, title = "scale_settling", say("Scale of {axis} settling", axis=AXIS)
+    family, title = "scale_settling", say("Scale of {axis} settling")
     formula, mechanism = "e_a = s·(1 − exp(−time/τ))·a", "temperature"
     points_to = say(
         "the scale of {axis} takes on another temperature and comes to rest: move the axis to warm it up before measuring, "
-        "and look at what heats or cools it, its motor or the air supply", axis=AXIS,
-    )  # fmt: skip
-    means = say(
-        "lengths along {axis} come to be indicated {size} too {wrong}, settling with {settling}",
-        axis=AXIS, size=SIZE, wrong=SENSE, settling=SECOND,
-    )  # fmt: skip
+        "and look at what heats or cools it, its motor or the air supply"
+    )
+    means = say("lengths along {axis} come to be indicated {size} too {wrong}, settling with {settling}")
     sense = (say("short"), say("long"))
     coefficients = (Parameter("ppm", unit("ppm"), 20.0, say("change")),)
     shape, columns = (SETTLING,), ("time_s",)
