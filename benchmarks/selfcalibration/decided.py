@@ -31,10 +31,9 @@ from benchmarks.selfcalibration.machines import (
     machine,
 )
 from cmm_uq.artefacts.shift import axis as of_axis, plane as of_plane
-from cmm_uq.artefacts.shift.decisions import figure_of
 from cmm_uq.artefacts.shift.integration import KnownSpan
 from cmm_uq.artefacts.shift.placed_plate import placed_plate
-from cmm_uq.artefacts.shift.result import peak_to_valley
+from cmm_uq.artefacts.shift.result import figure_of, peak_to_valley
 from cmm_uq.artefacts.shift.series import shifted_series
 from cmm_uq.artefacts.shift.smooth import Coefficients, SmoothModel
 from cmm_uq.base.messages import Verbatim

@@ -10,7 +10,7 @@ for a product of angles. Where the order is another the same holds of the axes i
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,17 @@ from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
-from cmm_uq.certificate.document import Block, Paragraph, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import (
+    Block,
+    Column,
+    Paragraph,
+    Section,
+    Table,
+    columns,
+    figure_columns,
+    section as sectioned,
+    table,
+)
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import expanded
@@ -166,7 +176,6 @@ SecondWay = DistanceSolution | Text  # by the distance equations, or why they ha
 
 
 def distances_data(result: Result, lengths: Lengths, second_way: SecondWay, **further: Any) -> dict[str, Any]:
-    """What results.json says of distances between two balls."""
     adjustments = [setting.as_data() for setting in settings(result)]
     data = {"lengths": lengths.as_data(), **further, "adjustments": adjustments}
     if isinstance(second_way, str):
@@ -179,34 +188,29 @@ def distances_data(result: Result, lengths: Lengths, second_way: SecondWay, **fu
 
 def section(result: Result, second_way: SecondWay, *remarks: Text) -> Section:
     order = KinematicChain.of(result.artefact.points.machine.chain).from_frame
-    blocks = (*_adjustments(settings(result), order), _second_way(result, second_way, remarks))
-    return Section(say("The adjustment that the machine needs"), blocks, opinion=True)
+    blocks = _adjustments(settings(result), order), _second_way(result, second_way, remarks)
+    return replace(sectioned(say("The adjustment that the machine needs"), *blocks), opinion=True)
 
 
-def _adjustments(settings: tuple[AdjustmentSetting, ...], order: Iterable[str]) -> tuple[Table, ...]:
+def _adjustments(settings: tuple[AdjustmentSetting, ...], order: Iterable[str]) -> Table | None:
     rows: list[tuple[Text, ...]] = []
     for setting in settings:
         over, sure = setting.over_travel, say("yes") if setting.beyond_doubt else NOTHING
         moved = NOTHING if over is None else rounded(over.value, max(over.u, 1e-3))[0]
         rows.append((setting.what, *expanded(setting.figure)[:2], setting.figure.unit, moved, sure))
-    if not rows:
-        return ()
-    columns = (
-        *text_columns(say("Adjustment")), *figure_columns(say("Value"), say("U")), *text_columns(say("Unit")),
-        *figure_columns(say("Over the travel"), unit=unit("µm")), *text_columns(say("Beyond doubt")),
-    )  # fmt: skip
     first, second, third = (Verbatim(axis.upper()) for axis in order)
     turning = say(
         "{first} stays; {second} is turned square to {first}, then {third} to both, about {first} first. Turns are "
-        "right-handed about the named axis.",
-        first=first,
-        second=second,
-        third=third,
-    )
+        "right-handed about the named axis.", first=first, second=second, third=third,
+    )  # fmt: skip
     doubt = say(
         "Beyond doubt: the 95 % interval does not contain zero. Over the travel: what the adjustment moves at its far end."
     )
-    return (Table(say("What to turn and what to enter"), columns, tuple(rows), (turning, doubt)),)
+    stated, over_travel = figure_columns(say("Value"), say("U")), Column(say("Over the travel"), unit("µm"))
+    return table(
+        say("What to turn and what to enter"),
+        [say("Adjustment"), *stated, say("Unit"), over_travel, say("Beyond doubt")], rows, turning, doubt,
+    )  # fmt: skip
 
 
 def _second_way(result: Result, solution: SecondWay, remarks: tuple[Text, ...]) -> Block:
@@ -217,18 +221,17 @@ def _second_way(result: Result, solution: SecondWay, remarks: tuple[Text, ...]) 
     rows: list[tuple[Text, ...]] = []
     for i, (effect, _) in enumerate(FACTORS):
         first: tuple[Text, ...] = (number(values[i], ".4g"), NOTHING, NOTHING)
-        if stated is not None:
-            first = (*rounded(float(values[i]), stated[i][0]), number(stated[i][1], ".2f"))
         if solution.open_scales and i < 3:
             first = (say("not determined"), NOTHING, NOTHING)
+        elif stated is not None:
+            first = (*rounded(float(values[i]), stated[i][0]), number(stated[i][1], ".2f"))
         beside: tuple[Text, ...] = (NOTHING, NOTHING)
         if effect in result.free:
             beside = (say("not determined"), NOTHING)
         elif (model := result.parameters.get(effect)) is not None:
             beside = expanded(next(iter(model.values())))[:2]
         rows.append((_NAMES[effect], *first, *beside, unit("ppm") if i < 3 else unit("″")))
-    figures = (say("Distance equations"), say("U"), say("k"), say("Fitted model"), say("U"))
-    columns = (*text_columns(say("Factor")), *figure_columns(*figures), *text_columns(say("Unit")))
+    figures = figure_columns(say("Distance equations"), say("U"), say("k"), say("Fitted model"), say("U"))
     e = commas(say("e{i} = {e}", i=i, e=signed(v, ".3e")) for i, v in enumerate(solution.e, 1))
     sd = say("{residual_sd:.3g} µm", residual_sd=solution.residual_sd / MICROMETRE)
     how = say(
@@ -236,16 +239,15 @@ def _second_way(result: Result, solution: SecondWay, remarks: tuple[Text, ...]) 
         factors=e,
         sd=sd,
     )
-    differ = (
-        say(
-            "Distance equations: U from their residuals and from the certified length, conditional on white noise; k of "
-            "Student's t. Fitted model: U averaged over what the noise may be."
-        )
-        if solution.relative_length_u
-        else say(
-            "Distance equations: U from their residuals, conditional on white noise and on the artefact's length as known; "
-            "k of Student's t. Fitted model: U averaged over what the noise may be, and over the length."
-        )
+    certified = say(
+        "Distance equations: U from their residuals and from the certified length, conditional on white noise; k of "
+        "Student's t. Fitted model: U averaged over what the noise may be."
     )
-    title = say("The six factors by the distance equations, a second way")
-    return Table(title, columns, tuple(rows), (how, differ, *remarks))
+    known = say(
+        "Distance equations: U from their residuals, conditional on white noise and on the artefact's length as known; "
+        "k of Student's t. Fitted model: U averaged over what the noise may be, and over the length."
+    )
+    title, notes = say("The six factors by the distance equations, a second way"), (how, certified, *remarks)
+    if not solution.relative_length_u:
+        notes = (how, known, *remarks)
+    return Table(title, columns([say("Factor"), *figures, say("Unit")]), tuple(rows), notes)

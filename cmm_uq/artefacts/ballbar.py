@@ -29,11 +29,11 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Column, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Column, Section, Table, columns, figure_columns
 from cmm_uq.certificate.pages.budget import budget_blocks
-from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
+from cmm_uq.certificate.plots.residuals import deviations_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating, numbered, refusal
+from cmm_uq.certificate.wording import numbered, refusal
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Size
@@ -128,20 +128,19 @@ class Ballbar(Artefact):
         return np.asarray(xyz[self.rows[:, 1]] - xyz[self.rows[:, 0]], dtype=np.float64)
 
 
-def _ends(points: Points, where: str | None) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+def _ends(points: Points, where: str | None) -> Ints:
     """Rows of points 1 and 2 of every bar, (m, 2)."""
     ends = []
     for rows in points.rows_of_groups:
         numbers = points.point[rows]
         if sorted(numbers.tolist()) != [1, 2]:
-            measurement, repeat = points.measurement[rows[0]], points.repeat[rows[0]]
-            line = points.lines[rows[0]] if len(points.lines) else 0
-            missing = sorted({1, 2} - set(numbers.tolist()))
-            problem = (
-                f"measurement {measurement}, repeat {repeat} has no point {missing[0]}: a bar with one end"
-                if missing
-                else f"measurement {measurement}, repeat {repeat} has points {sorted(numbers.tolist())}, a bar has 1 and 2"
+            missing, has = (
+                sorted({1, 2} - set(numbers.tolist())),
+                f"has points {sorted(numbers.tolist())}, a bar has 1 and 2",
             )
+            what = f"has no point {missing[0]}: a bar with one end" if missing else has
+            problem = f"measurement {points.measurement[rows[0]]}, repeat {points.repeat[rows[0]]} {what}"
+            line = points.lines[rows[0]] if len(points.lines) else 0
             fix = "Record both balls, as points 1 and 2, or leave out the measurement"
             raise CmmUqError(problem, where=f"{where or 'recording'} line {line}", fix=fix)
         ends.append(rows[np.argsort(numbers)])
@@ -189,9 +188,11 @@ def ballbar_positions(setting: Setting) -> tuple[SetUp, ...]:
 
 
 def _lines(
-    setting: Setting, volume: Volume, pattern: Pattern,
+    setting: Setting,
+    volume: Volume,
+    pattern: Pattern,
     wanted: list[tuple[tuple[int, int, int], tuple[float, float, float]]],
-) -> list[SetUp]:  # fmt: skip
+) -> list[SetUp]:
     found = []
     for direction, place in wanted:
         u = np.array(direction, dtype=np.float64)
@@ -236,21 +237,17 @@ def results(result: Result) -> dict[str, Any]:
 
 def _budget(result: Result, bar: Ballbar) -> Budget:
     """What one length's deviation from the reference is uncertain by: the readings, and the certified length."""
-    coordinate, size = result.noise.coordinate, bar.sizes[0]
+    coordinate, size, um = result.noise.coordinate, bar.sizes[0], unit("µm")
     origin = say("residuals of this recording") if coordinate.u > 0 else say("stated in the job")
-    what, dof, twice = (
-        say("Coordinate of a ball, along the bar, twice"),
-        coordinate.degrees_of_freedom,
-        bar.noise_scale[0],
-    )
-    lines = [BudgetLine(what, coordinate.value, origin, unit=unit("µm"), dof=dof, sensitivity=float(twice))]
+    what, twice = say("Coordinate of a ball, along the bar, twice"), float(bar.noise_scale[0])
+    dof = coordinate.degrees_of_freedom
+    lines = [BudgetLine(what, coordinate.value, origin, unit=um, dof=dof, sensitivity=twice)]
     if size.certified and size.sd > 0:
         chain = result.job.facts.artefact.certificate
         number = chain.number if chain else ""
         source = say("certificate {number}", number=Verbatim(number)) if number else say("certificate")
-        u = size.sd / MICROMETRE
-        lines.append(BudgetLine(say("Certified length"), u, source, unit=unit("µm"), sensitivity=-1.0))
-    return Budget(say("deviation of one length"), lines, unit=unit("µm"))
+        lines.append(BudgetLine(say("Certified length"), size.sd / MICROMETRE, source, unit=um, sensitivity=-1.0))
+    return Budget(say("deviation of one length"), lines, unit=um)
 
 
 def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | Text:
@@ -271,28 +268,21 @@ _ROWS_SHOWN = 60
 
 def sections(result: Result) -> list[Section]:
     bar = cast("Ballbar", result.artefact)
-    size, lengths = bar.sizes[0], _lengths(result, bar)
+    size, lengths, budget = bar.sizes[0], _lengths(result, bar), _budget(result, bar)
     name = say("certified length") if size.certified else say("mean length")
-    deviations, residuals, expanded = lengths.deviation_um, lengths.residual_um, lengths.expanded_um
-    what = say("{count} lengths: as recorded they deviate", count=len(deviations))
-    plot = length_plot(
-        lengths.measurement.astype(float),
-        deviations,
-        residuals,
-        flagged=lengths.flagged,
-        expanded_before_um=expanded,
+    caption = say(
+        "Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = {k}).",
+        name=name,
+        k=number(lengths.coverage_factor, ".2f"),
+    )
+    plot = deviations_plot(
+        result, lengths.deviation_um, say("{count} lengths: as recorded they deviate", count=len(lengths.length)),
+        say("from the {name}", name=name), expanded_um=lengths.expanded_um, caption=caption, spec=".0f",
         reference=say("{name} {length:.4f}\u00a0mm", name=name, length=lengths.reference),
         reference_expanded_um=2 * size.sd / MICROMETRE if size.certified else 0.0,
-        caption=say(
-            "Deviation of each length from the {name}, as recorded and after the fitted model, with U (k = {k}).",
-            name=name,
-            k=number(lengths.coverage_factor, ".2f"),
-        ),
-        alternative=deviating(what, say("from the {name}", name=name), deviations, residuals, ".0f"),
-    )
-    volume, budget = residual_volume(result, say("bars")), _budget(result, bar)
+    )  # fmt: skip
     return [
-        Section(say("Lengths"), (plot, volume, _table(lengths, name))),
+        Section(say("Lengths"), (plot, residual_volume(result, say("bars")), _table(lengths, name))),
         Section(say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), budget))),
         *bar.further_sections(result),
         adjustment.section(result, _second_way(result, bar)),
@@ -300,26 +290,26 @@ def sections(result: Result) -> list[Section]:
 
 
 def _table(lengths: Lengths, name: Text) -> Table:
-    expanded, repeated = lengths.expanded_um, lengths.repeat.max() > 1
+    U, repeated = lengths.expanded_um, lengths.repeat.max() > 1
     figures = np.column_stack([lengths.length, lengths.deviation_um, lengths.residual_um])[:_ROWS_SHOWN]
     rows = []
     for i, row in enumerate(figures.tolist()):
-        shown = [rounded(x, U)[0] for x, U in zip(row, (expanded * MICROMETRE, expanded, expanded), strict=True)]
+        shown = [rounded(x, each)[0] for x, each in zip(row, (U * MICROMETRE, U, U), strict=True)]
         place = numbered(lengths.measurement[i], lengths.repeat[i] if repeated else None)
         mark = say("set aside") if not lengths.used[i] else say("see warnings") if lengths.flagged[i] else NOTHING
         rows.append((place, *shown, mark))
     from_reference = figure_columns(say("From the {name}", name=name), say("Residual"), unit=unit("µm"))
-    columns = (
-        *text_columns(say("Position")), Column(say("Length"), unit("mm")), *from_reference, *text_columns(say("Remark")),
-    )  # fmt: skip
-    note = say(
-        "U = {U} µm (k = {k}) for each length, from the standard uncertainty of a coordinate and how well that is known.",
-        U=rounded(0.0, expanded)[1],
-        k=number(lengths.coverage_factor, ".2f"),
-    )
-    left = len(lengths.length) - len(rows)
-    notes = (note, say("{left} more lengths are in the attached recording.", left=left)) if left > 0 else (note,)
-    return Table(say("Lengths brought to 20 °C"), columns, tuple(rows), notes)
+    heads = columns([say("Position"), Column(say("Length"), unit("mm")), *from_reference, say("Remark")])
+    notes = [
+        say(
+            "U = {U} µm (k = {k}) for each length, from the standard uncertainty of a coordinate and how well that is known.",
+            U=rounded(0.0, U)[1],
+            k=number(lengths.coverage_factor, ".2f"),
+        )
+    ]
+    if (left := len(lengths.length) - len(rows)) > 0:
+        notes.append(say("{left} more lengths are in the attached recording.", left=left))
+    return Table(say("Lengths brought to 20 °C"), heads, tuple(rows), tuple(notes))
 
 
 PAGE = Page(sections, results)

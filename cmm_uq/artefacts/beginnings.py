@@ -33,11 +33,13 @@ PLANE_SHIFTED = Beginning(
     title="Self-calibration of a plane by shifting and turning an uncalibrated plate",
     numbering="One measurement is one placing of the plate; its points are the balls.",
     artefact={
-        "name": "Ball plate, uncalibrated but for its diagonal", "plane": "xy",
+        "name": "Ball plate, uncalibrated but for its diagonal",
+        "plane": "xy",
         "known": {"from": 1, "to": SIDE**2, "length_mm": round(PITCH * (SIDE - 1) * 2**0.5, 4), "u_um": 0.5},
     },
-    effects=(), points=placed_plate,
-)  # fmt: skip
+    effects=(),
+    points=placed_plate,
+)
 
 TEMPERATURES = (20.0, 25.0, 30.0)
 EXPANSION_UM_PER_M_K = 8.0  # of the scales, so that the maps differ by temperature alone
@@ -45,7 +47,6 @@ STEPS, NOISE = 20, 0.2  # steps over each axis, and standard deviation of every 
 
 
 def maps(machine: Machine) -> dict[str, bytes]:
-    """One map at each temperature, simulated."""
     random, files = np.random.default_rng(1), {}
     for temperature in TEMPERATURES:
         lines = ["# simulated by cmm-uq new: put in the maps of your machine", f"axis,position_mm,{','.join(COLUMNS)}"]

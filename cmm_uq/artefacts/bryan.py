@@ -28,16 +28,16 @@ from cmm_uq.artefacts.distance_equations import (
     solve_distances,
 )
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, number, say
+from cmm_uq.base.messages import Text, number, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.certificate.document import Section
-from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
+from cmm_uq.certificate.plots.residuals import deviations_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating, refusal
+from cmm_uq.certificate.wording import refusal
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, ranges_of_repeats
 from cmm_uq.machine.model.placed import Radial
-from cmm_uq.machine.model.recorded import expansion, place
+from cmm_uq.machine.model.recorded import expansion, refuse
 from cmm_uq.maths.geometry import fit_sphere
 
 _STEPS, _CLOSE = 30, 1e-12
@@ -58,13 +58,13 @@ class Bryan(Radial):
     plural = "the recorded bars"
 
     def __init__(self, facts: ArtefactFacts, points: Points, *, where: str | None = None) -> None:
-        if np.any(other := points.point != 1):
-            raise CmmUqError(
-                f"measurement {points.measurement[np.argmax(other)]} has a point {points.point[np.argmax(other)]}: only the "
-                "swept ball is recorded, as point 1; the fixed ball's centre is estimated",
-                where=place(points, other, where),
-                fix="Leave the fixed ball out, or mend [artefact] kind in job.toml",
-            )
+        other = points.point != 1
+        first = int(np.argmax(other))
+        refuse(
+            points, other, where,
+            f"measurement {points.measurement[first]} has a point {points.point[first]}: only the swept ball is recorded, as "
+            "point 1; the fixed ball's centre is estimated", "Leave the fixed ball out, or mend [artefact] kind in job.toml",
+        )  # fmt: skip
         whole_job = np.zeros(len(points), dtype=np.int64)
         super().__init__(facts, points, Placings(whole_job, np.array([0])), expansion(facts, points), where)
 
@@ -97,8 +97,10 @@ class Bryan(Radial):
 
         def spread(radii: Floats, freedom: int, what: str) -> dict[str, ArtefactFigure]:
             about = radii - radii.mean()
-            return {f"span{what}": whole(float(np.ptp(radii))),
-                    f"standard deviation{what}": whole(float(np.sqrt(about @ about / freedom)))}  # fmt: skip
+            return {
+                f"span{what}": whole(float(np.ptp(radii))),
+                f"standard deviation{what}": whole(float(np.sqrt(about @ about / freedom))),
+            }
 
         if freedom > 0:
             found |= spread(radii, freedom, "")
@@ -240,9 +242,11 @@ def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
     true = np.array([model[key][0][0] if key in model else 0.0 for key in FACTORS])
     size = bar.sizes[0]
     return replace(
-        solution, bias=exact.factors - true, open_scales=not size.certified,
+        solution,
+        bias=exact.factors - true,
+        open_scales=not size.certified,
         relative_length_u=float(np.hypot(size.sd / size.nominal, result.relative_doubt)) if size.certified else 0.0,
-    )  # fmt: skip
+    )
 
 
 def results(result: Result) -> dict[str, Any]:
@@ -259,23 +263,15 @@ IN_TWO_STEPS = say(
 def sections(result: Result) -> list[Section]:
     bar = cast("Bryan", result.artefact)
     lengths = _distances(result, bar)
-    deviations, residuals = lengths.deviation_um, lengths.residual_um
-    plot = length_plot(
-        lengths.measurement.astype(float),
-        deviations,
-        residuals,
-        expanded_before_um=lengths.expanded_um,
-        reference=say("mean distance from the best centre"),
-        flagged=lengths.flagged,
-        position_label=say("Position of the swept ball"),
-        caption=say(
-            "Distance of the swept ball from the fixed one, as recorded and after the fitted model, with U (k = {k}).",
-            k=number(lengths.coverage_factor, ".2f"),
-        ),
-        alternative=deviating(
-            say("{count} positions: about the best centre the distances deviate", count=len(deviations)), NOTHING,
-            deviations, residuals,
-        ),
+    caption = say(
+        "Distance of the swept ball from the fixed one, as recorded and after the fitted model, with U (k = {k}).",
+        k=number(lengths.coverage_factor, ".2f"),
+    )
+    plot = deviations_plot(
+        result, lengths.deviation_um,
+        say("{count} positions: about the best centre the distances deviate", count=len(lengths.length)),
+        expanded_um=lengths.expanded_um, reference=say("mean distance from the best centre"),
+        position_label=say("Position of the swept ball"), caption=caption,
     )  # fmt: skip
     return [
         Section(say("Distances"), (plot, residual_volume(result, say("swept positions")))),

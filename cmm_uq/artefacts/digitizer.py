@@ -28,7 +28,7 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings, Size
 from cmm_uq.machine.model.placed import Radial
-from cmm_uq.machine.model.recorded import columns_needed, expansion, place
+from cmm_uq.machine.model.recorded import columns_needed, expansion, place, refuse
 from cmm_uq.machine.physics.digitizer import (
     THREE_ATTITUDES,
     Alignment,
@@ -80,6 +80,14 @@ class Centre:
 
 
 OFFSET = ("U1", "V1", "W1")
+
+
+def offset_sizes(offset: Floats) -> tuple[Size, ...]:
+    """[U1 V1 W1] (3,) as sizes that are sought."""
+    each = zip(OFFSET, offset.tolist(), strict=True)
+    return tuple(Size(f"{name}_mm", Verbatim(name), unit("mm"), value, np.inf, role="sought") for name, value in each)
+
+
 _FAR = 0.2  # part of the offset by which a drawing may be off before a unit or a column is taken for mistaken
 
 
@@ -110,9 +118,10 @@ class DigitizerArtefact(Artefact):
             self.leans, offset = axes_of_scans(points.xyz, self.attitude, self._seen, self.start)
         carried = self._carried(offset)
         self.points = replace(
-            points, machine=replace(points.machine, tip_on_every_carriage=True),
+            points,
+            machine=replace(points.machine, tip_on_every_carriage=True),
             columns={**points.columns, **{f"tip_{axis}_mm": carried[:, i] for i, axis in enumerate(AXES)}},
-        )  # fmt: skip
+        )
         self._tip = carried
         # observations, sizes and place are all seen along the directions of the recorded points: taken anew at fitted
         # ones, they would differ by the noise, and what no recording determines would seem determined
@@ -122,11 +131,7 @@ class DigitizerArtefact(Artefact):
         )
         self.rows, self.noise_scale = self.target.rows, self.target.noise_scale
         self.u_turn, self.u_shift = facts.u_attitude_arcsec, facts.u_centre_um
-        sought = (
-            Size(f"{name}_mm", Verbatim(name), unit("mm"), float(value), np.inf, role="sought")
-            for name, value in zip(OFFSET, offset, strict=True)
-        )
-        self.sizes = (*sought, *self.target.sizes, *self._set_up_sizes())
+        self.sizes = (*offset_sizes(offset), *self.target.sizes, *self._set_up_sizes())
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         own = len(self.target.sizes)
@@ -189,9 +194,7 @@ class DigitizerArtefact(Artefact):
         if not np.ptp(points.xyz, axis=0).any():
             raise CmmUqError("the scale readings are all the same: nothing moved between the attitudes", where=where,
                              fix="Record the scale readings D, E, F as x_mm, y_mm, z_mm")  # fmt: skip
-        if facts.offset_mm is None:
-            return
-        drawn = np.array(facts.offset_mm)
+        drawn = np.array(facts.offset_mm or self.start.offset)
         if np.linalg.norm(self.start.offset - drawn) > _FAR * np.linalg.norm(drawn):
             found = ", ".join(f"{value:.3f}" for value in self.start.offset)
             fix = "Check the units, the Euler angles, and offset_mm in job.toml [artefact]"
@@ -263,13 +266,10 @@ def scan_of(points: Points) -> Floats | None:
 
 
 def check_angles(points: Points, where: str | None) -> None:
-    """Refuse a recording without attitudes, or with several in one measurement."""
     angles = columns_needed(points, ANGLES, "digitizer", where)
     off = np.any(np.abs(angles - Placings.of(points.measurement).means(angles)) > _SAME, axis=1)
-    if off.any():
-        number = points.measurement[np.argmax(off)]
-        raise CmmUqError(f"measurement {number} has several attitudes", where=place(points, off, where),
-                         fix="Number each attitude of the digitizer as a measurement of its own")  # fmt: skip
+    problem = f"measurement {points.measurement[np.argmax(off)]} has several attitudes"
+    refuse(points, off, where, problem, "Number each attitude of the digitizer as a measurement of its own")
 
 
 def alignments(points: Points, where: str | None) -> tuple[Alignment, ...]:
@@ -288,9 +288,11 @@ def alignments(points: Points, where: str | None) -> tuple[Alignment, ...]:
         try:
             found.append(align_on_sphere(scan[rows], points.xyz[rows], alpha, beta, gamma, u_point=MICROMETRE))
         except CmmUqError as error:
-            raise CmmUqError(f"measurement {measurement}: {error.problem}", where=place(points, rows, where),
-                             fix="Scan as much of the sphere as the digitizer sees, moving the machine across it",
-                             ) from error  # fmt: skip
+            raise CmmUqError(
+                f"measurement {measurement}: {error.problem}",
+                where=place(points, rows, where),
+                fix="Scan as much of the sphere as the digitizer sees, moving the machine across it",
+            ) from error
     return tuple(found)
 
 
@@ -306,28 +308,24 @@ def worst_direction(found: Sequence[Alignment]) -> tuple[Floats, float]:
 
 
 def refuse_undetermined(found: Sequence[Alignment], where: str | None) -> None:
-    """Refuse attitudes that leave a component of the offset open."""
     direction, times = worst_direction(found)
-    if times <= MOST:
-        return
-    told = "" if np.isinf(times) else f", {times:.0f} times as uncertain as a centre"
-    problem = f"{len(found)} attitudes leave the offset of the mount along {words(direction)} open{told}"
-    raise CmmUqError(problem, where=where, fix=THREE_ATTITUDES)
+    if times > MOST:
+        told = "" if np.isinf(times) else f", {times:.0f} times as uncertain as a centre"
+        problem = f"{len(found)} attitudes leave the offset of the mount along {words(direction)} open{told}"
+        raise CmmUqError(problem, where=where, fix=THREE_ATTITUDES)
 
 
 def words(direction: Floats) -> Text:
     """A direction (3,) in the digitizer's frame: ``w``, or ``0.37 u + 0.66 v − 0.66 w``."""
     parts = [(float(part), Verbatim(axis)) for part, axis in zip(direction, "uvw", strict=True) if abs(part) > _LITTLE]
     (first, axis), *further = parts
-    if not further:
-        return axis
     text: Text = say("{part} {axis}", part=signed(first, ".2f"), axis=axis)
-    for part, axis in further:
+    for part, other in further:
         size, before = number(abs(part), ".2f"), text
-        text = say("{before} + {size} {axis}", before=before, size=size, axis=axis)
+        text = say("{before} + {size} {axis}", before=before, size=size, axis=other)
         if part < 0:
-            text = say("{before} − {size} {axis}", before=before, size=size, axis=axis)
-    return text
+            text = say("{before} − {size} {axis}", before=before, size=size, axis=other)
+    return text if further else axis
 
 
 # α, β, γ in degrees of the source's alignments 1, 2 and 3 (Harris 2004 section 5.3)
@@ -337,31 +335,27 @@ THREE = ((90.0, 90.0, 0.0), (90.0, 90.0, 90.0), (180.0, 90.0, 0.0))
 RINGS = ((0.0, 1), (25.0, 6), (50.0, 12), (75.0, 18))
 
 
-def seen_directions() -> Floats:
-    """(n, 3) from the centre of the sphere to its points, along u, v, w: the digitizer looks along −v."""
-    found = []
+def scan(attitude: Floats, offset: Floats, radius: float) -> tuple[Floats, Floats]:
+    """Scan of a sphere about the origin: u, v (n, 2) and scale readings (n, 3), mm; the machine moves along w.
+
+    The digitizer looks along −v.
+    """
+    seen = []
     for down, count in RINGS:
         around = 2 * np.pi * np.arange(count) / count
         flat, up = np.sin(np.radians(down)), np.cos(np.radians(down))
-        found.append(np.column_stack([flat * np.cos(around), np.full(count, up), flat * np.sin(around)]))
-    return np.vstack(found)
-
-
-def scan(attitude: Floats, offset: Floats, radius: float) -> tuple[Floats, Floats]:
-    """Scan of a sphere about the origin: u, v (n, 2) and scale readings (n, 3), mm; the machine moves along w."""
-    seen = radius * seen_directions()
-    along = np.column_stack([np.zeros((len(seen), 2)), seen[:, 2]])
-    return seen[:, :2], (along + offset) @ attitude.T
+        seen.append(radius * np.column_stack([flat * np.cos(around), np.full(count, up), flat * np.sin(around)]))
+    u, v, w = np.vstack(seen).T
+    return np.column_stack([u, v]), (np.column_stack([0 * w, 0 * w, w]) + offset) @ attitude.T
 
 
 def three_attitudes(setting: Setting) -> tuple[SetUp, ...]:
     """The source's three; scans where the job gives the sphere's diameter, else centres."""
-    facts, plan, volume = cast("ReferenceSphereFacts", setting.artefact), setting.plan, setting.volume
+    facts, times, volume = cast("ReferenceSphereFacts", setting.artefact), setting.plan.repeats, setting.volume
     if facts.offset_mm is None:
         raise CmmUqError("where the mount lies is needed", where="job.toml [artefact] offset_mm",
                          fix="Give [U1, V1, W1] by the drawing, mm; it is not taken as known")  # fmt: skip
-    offset, radius = np.array(facts.offset_mm), 0.5 * (facts.length_mm or 0.0)
-    parts = []
+    offset, radius, parts = np.array(facts.offset_mm), 0.5 * (facts.length_mm or 0.0), []
     for angles in THREE:
         attitude = euler_313(*np.radians(angles))
         parts.append(scan(attitude, offset, radius) if radius else (np.zeros((0, 2)), (attitude @ offset)[None]))
@@ -372,18 +366,15 @@ def three_attitudes(setting: Setting) -> tuple[SetUp, ...]:
     middle = room.mean(axis=1) - readings.mean(axis=0)
     found = []
     for angles, (seen, moved) in zip(THREE, parts, strict=True):
-        count, times = len(moved), plan.repeats
+        count = len(moved)
         columns = {name: np.full(count * times, angle) for name, angle in zip(ANGLES, angles, strict=True)}
         if radius:
             columns |= {name: np.tile(seen[:, i], times) for i, name in enumerate(SCAN)}
         xyz = np.tile(middle + moved - setting.machine.origin_mm, (times, 1))
-        points = Points(
-            xyz, np.ones(len(xyz), dtype=np.int64), np.tile(np.arange(1, count + 1), times),
-            np.repeat(np.arange(1, times + 1), count), setting.machine, columns,
-        )  # fmt: skip
+        point, repeat = np.tile(np.arange(1, count + 1), times), np.repeat(np.arange(1, times + 1), count)
         alpha, beta, gamma = angles
         title = say("α = {alpha:g}°, β = {beta:g}°, γ = {gamma:g}°", alpha=alpha, beta=beta, gamma=gamma)
-        found.append(SetUp(title, points))
+        found.append(SetUp(title, Points(xyz, np.ones_like(point), point, repeat, setting.machine, columns)))
     return tuple(found)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
@@ -13,7 +13,7 @@ from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, THREE, DigitizerArtefact,
 from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table, columns, figure_columns
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.result import Page, Result
@@ -29,8 +29,6 @@ _SAME_ATTITUDE = 0.01  # degrees within which an attitude is one of the source's
 
 @dataclass(frozen=True, eq=False)
 class AttitudePose:
-    """One attitude, aligned by itself."""
-
     measurement: int  # number
     angles_deg: Floats  # (3,) α, β, γ
     points: int  # recorded in it
@@ -71,20 +69,14 @@ class OffsetFigures:
 
     def table(self, *further: Text) -> Table:
         rows = []
-        for i, (name, quantity) in enumerate(zip(OFFSET, self.offset, strict=True)):
-            value, U, k = expanded(quantity)
-            rows.append((Verbatim(name), value, U, k, unit("mm"), *(signed(one, ".2f") for one in self.correlation[i])))
-        correlations = (say("Correlation with {name}", name=Verbatim(name)) for name in OFFSET)
-        columns = (
-            *text_columns(say("Component")), *figure_columns(say("Estimate"), say("U"), say("k")),
-            *text_columns(say("Unit")), *figure_columns(*correlations),
-        )  # fmt: skip
-        notes = (
-            MEANING,
-            say("U is the expanded uncertainty for a coverage probability of 95 %; k = U/u."),
-            *further,
-        )
-        return Table(say("Offset of the mount"), columns, tuple(rows), notes)
+        for name, quantity, correlations in zip(OFFSET, self.offset, self.correlation, strict=True):
+            row = (Verbatim(name), *expanded(quantity), unit("mm"), *(signed(one, ".2f") for one in correlations))
+            rows.append(row)
+        correlated = (say("Correlation with {name}", name=Verbatim(name)) for name in OFFSET)
+        stated = figure_columns(say("Estimate"), say("U"), say("k"))
+        heads = columns([say("Component"), *stated, say("Unit"), *figure_columns(*correlated)])
+        meaning = say("U is the expanded uncertainty for a coverage probability of 95 %; k = U/u.")
+        return Table(say("Offset of the mount"), heads, tuple(rows), (MEANING, meaning, *further))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +107,6 @@ class DigitizerFigures(OffsetFigures):
 
     @cached_property
     def start(self) -> MountOffset:
-        """The offset from these alone."""
         return self.digitizer.start if self._true is None else mount_offset(self.alignments)
 
     def _readings(self) -> list[Floats]:
@@ -164,8 +155,7 @@ class DigitizerFigures(OffsetFigures):
 def results(result: Result) -> Mapping[str, Any]:
     """For results.json; ``cmm-uq compensate`` reads offset, covariance and poses back."""
     found = DigitizerFigures(result)
-    closed, start = found.closed_form, found.start
-    direction, times = found.times
+    closed, (direction, times) = found.closed_form, found.times
     return {
         "digitizer": {
             **found.as_data(),
@@ -176,7 +166,7 @@ def results(result: Result) -> Mapping[str, Any]:
                  "points": pose.points}
                 for pose in found.poses
             ],
-            "by_centres_mm": start.offset.tolist(),
+            "by_centres_mm": found.start.offset.tolist(),
             "closed_form_mm": None if closed is None else closed.tolist(),
             "least_determined": {"direction_uvw": direction.tolist(), "u_over_u_of_a_centre": times},
         }
@@ -196,10 +186,9 @@ def _offset(found: DigitizerFigures) -> Table:
     return found.table(say("Centre of the reference sphere: ({x}, {y}, {z}) mm in the recorded frame.", x=x, y=y, z=z))
 
 
-def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
+def _assumed(digitizer: DigitizerArtefact) -> Iterator[Block]:
     """What is known of each attitude by itself, and of what U contains nothing."""
-    known: list[Text] = []
-    missing = []
+    known, missing = list[Text](), list[Text]()
     if digitizer.u_turn:
         known.append(say("attitude, u = {u:g}″ about each axis", u=digitizer.u_turn))
     else:
@@ -209,48 +198,46 @@ def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
         known.append(say("the sphere's centre as a whole, u = ({x:g}, {y:g}, {z:g}) µm along x, y, z", x=x, y=y, z=z))
     else:
         missing.append(say("of what shifts a whole scan: form of the ball, digitizer, scales"))
-    blocks: list[Block] = []
     if known:
-        blocks.append(Paragraph(say("In each attitude by itself, U contains: {known}.", known=semicolons(known))))
-    if missing:
-        first, *others = missing
-        nothing = say("U contains no uncertainty {missing}.", missing=first)
-        if others:
-            nothing = say("U contains no uncertainty {first} and none {second}.", first=first, second=others[0])
-        blocks.append(Paragraph(nothing, tone="note"))
-    return blocks
+        yield Paragraph(say("In each attitude by itself, U contains: {known}.", known=semicolons(known)))
+    if len(missing) == 1:
+        yield Paragraph(say("U contains no uncertainty {missing}.", missing=missing[0]), tone="note")
+    elif missing:
+        first, second = missing
+        nothing = say("U contains no uncertainty {first} and none {second}.", first=first, second=second)
+        yield Paragraph(nothing, tone="note")
 
 
 def _two_ways(found: DigitizerFigures) -> Table:
     start, closed = found.start.offset, found.closed_form
     rows = []
     for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
-        value, _ = rounded(quantity.value, quantity.expanded)
-        each, _ = rounded(float(start[i]), quantity.expanded)
-        by_source = DASH if closed is None else rounded(float(closed[i]), quantity.expanded)[0]
-        rows.append((Verbatim(name), value, each, by_source, unit("mm")))
-    ways = figure_columns(say("Fitted model"), say("By centres"), say("Closed form"))
-    columns = (*text_columns(say("Component")), *ways, *text_columns(say("Unit")))
+        values = (quantity.value, float(start[i]), *(() if closed is None else (float(closed[i]),)))
+        ways = [rounded(value, quantity.expanded)[0] for value in values]
+        rows.append((Verbatim(name), *ways, *(() if closed is not None else (DASH,)), unit("mm")))
+    figures = figure_columns(say("Fitted model"), say("By centres"), say("Closed form"))
     note = say(
         "By centres: the centre of the sphere in each attitude by itself, then all equations by weighted least "
         "squares. Closed form: Harris 2004 eq. 19–21, for its three attitudes."
     )
-    return Table(say("The offset by other ways"), columns, tuple(rows), (note,))
+    heads = columns([say("Component"), *figures, say("Unit")])
+    return Table(say("The offset by other ways"), heads, tuple(rows), (note,))
 
 
 def _attitudes(found: DigitizerFigures) -> Table:
-    rows = [
+    rows = tuple(
         (
             number(pose.measurement), *(signed(angle, "g") for angle in pose.angles_deg), number(pose.points),
             *(signed(value, ".4f") for value in pose.reading_mm), *(signed(value, ".1f") for value in pose.off_um),
             DASH if pose.rms_um is None else number(pose.rms_um, ".1f"),
         )
         for pose in found.poses
-    ]  # fmt: skip
-    columns = (
-        Column(say("No.")), *(Column(Verbatim(name), unit("°")) for name in "αβγ"), Column(say("Points")),
-        *(Column(Verbatim(f"{name}0"), unit("mm")) for name in "DEF"),
-        *(Column(say("Off {axis}", axis=Verbatim(axis)), unit("µm")) for axis in "xyz"), Column(say("Rms"), unit("µm")),
+    )  # fmt: skip
+    off = (say("Off {axis}", axis=Verbatim(axis)) for axis in "xyz")
+    heads = (
+        Column(say("No.")), *figure_columns(*map(Verbatim, "αβγ"), unit=unit("°")), Column(say("Points")),
+        *figure_columns(*(Verbatim(f"{name}0") for name in "DEF"), unit=unit("mm")),
+        *figure_columns(*off, say("Rms"), unit=unit("µm")),
     )  # fmt: skip
     direction, times = found.times
     meaning = say(
@@ -262,7 +249,7 @@ def _attitudes(found: DigitizerFigures) -> Table:
         direction=words(direction),
         times=times,
     )
-    return Table(say("Every attitude"), columns, tuple(rows), (meaning, least))
+    return Table(say("Every attitude"), heads, rows, (meaning, least))
 
 
 def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
@@ -270,17 +257,14 @@ def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
     xyz = digitizer.points.xyz  # before: about the offset from the centres, without any effect of the machine
     fitted = digitizer.fit(xyz, np.array([size.nominal for size in digitizer.sizes]))
     before = digitizer.project(fitted, (xyz - fitted)[:, :, None])[:, 0] / MICROMETRE
-    expanded_um = result.noise.expanded
     radial, each = say("radial distance of each point of the sphere"), say("each coordinate of the centre")
-    what = radial if digitizer.scanned else each
+    what, k = radial if digitizer.scanned else each, number(result.noise.coverage_factor, ".2f")
     low, high, low_after, high_after = alike(before.min(), before.max(), after.min(), after.max())
     return length_plot(
-        digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um,
+        digitizer.measurement.astype(float), before, after, expanded_before_um=result.noise.expanded,
         reference=say("fitted sphere") if digitizer.scanned else say("common centre"), flagged=result.flagged,
         position_label=say("Attitude (its observations side by side)"), before_label=say("With the offset by centres"),
-        caption=say(
-            "Residuals, {what}, with U (k = {k}) of a coordinate.", what=what, k=number(result.noise.coverage_factor, ".2f")
-        ),
+        caption=say("Residuals, {what}, with U (k = {k}) of a coordinate.", what=what, k=k),
         alternative=say(
             "{count} observations: with the offset by centres they deviate by {low} to {high} µm; after the "
             "fitted model {low_after} to {high_after} µm remain.",

@@ -148,13 +148,13 @@ def missing_placings(differences: Floats) -> tuple[Text, ...]:
 
 
 def refuse_poor_placings(differences: Floats) -> None:
-    """Refuse distances that do not determine all six factors."""
     apart = np.linalg.norm(differences, axis=1)
     if np.any(apart == 0):
         raise CmmUqError(
             say("distance {number} is zero: both positions are the same", number=int(np.argmin(apart)) + 1),
-            where="recording", fix=say("Record two different positions"),
-        )  # fmt: skip
+            where="recording",
+            fix=say("Record two different positions"),
+        )
     wanted = missing_placings(differences)
     if not wanted:
         return

@@ -18,7 +18,6 @@ from cmm_uq.analysis.planning import candidates
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, line_misfit, rows_by
-from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import unit
@@ -26,7 +25,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Placings, Size
 from cmm_uq.machine.model.artefact_doubt import CertifiedPlaces, by_certificate, faults
-from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
+from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, refuse
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_errors import ALONG_A_LINE, Body
 from cmm_uq.maths.inference.linear_model import Freedoms
@@ -113,8 +112,6 @@ _SAME_FACE = 1e-6  # mm; certified distances closer than this belong to one face
 
 @dataclass(frozen=True, eq=False)
 class Reversals:
-    """Faces reached from both sides."""
-
     measurement: Ints  # (p,) of each such face
     reference: Floats  # (p,) its certified distance, mm
     gap: Floats  # (p,) found when travelling away from the first face minus when travelling towards it, mm
@@ -247,8 +244,9 @@ class StepGauge(Artefact):
             counts.append(count)
         both = (counts[0] > 0) & (counts[1] > 0)
         weights = sense / np.maximum(np.where(sense > 0, counts[0][index], counts[1][index]), 1) * both[index]
-        return Reversals(self.points.measurement[first[both]], self.reference[first[both]],
-                         (means[0] - means[1])[both], weights)  # fmt: skip
+        return Reversals(
+            self.points.measurement[first[both]], self.reference[first[both]], (means[0] - means[1])[both], weights
+        )
 
     def _distances(self, length: float) -> Floats:
         if self.certificate.plain:
@@ -258,28 +256,21 @@ class StepGauge(Artefact):
 
     def _refuse_what_is_no_gauge(self, where: str | None) -> None:
         points, lines, what = self.points, self._lines, self.title.lower()
-        if np.any(at := (points.point == 1) & (np.abs(self.reference) > _SAME_FACE)):
-            raise CmmUqError(
-                f"point 1 has reference_mm = {self.reference[np.argmax(at)]:g}: distances count from point 1, so it has 0",
-                where=place(points, at, where),
-                fix="Subtract the first distance from all of the measurement",
-            )
+        at = (points.point == 1) & (np.abs(self.reference) > _SAME_FACE)
+        problem = (
+            f"point 1 has reference_mm = {self.reference[np.argmax(at)]:g}: distances count from point 1, so it has 0"
+        )
+        refuse(points, at, where, problem, "Subtract the first distance from all of the measurement")
         spans = lines.sums(self._ends * self.reference)
-        if np.any(single := spans <= _SAME_FACE):
-            at = points.measurement == lines.numbers[np.argmax(single)]
-            raise CmmUqError(
-                f"measurement {lines.numbers[np.argmax(single)]} has a single face, so it tells no length of the {what}",
-                where=place(points, at, where),
-                fix="Record at least two faces of different reference_mm in each measurement, or leave it out",
-            )
         bars = np.linalg.norm(lines.sums(self._ends[:, None] * points.xyz), axis=1)
-        if np.any(bars == 0):
-            at = points.measurement == lines.numbers[np.argmin(bars)]
-            raise CmmUqError(
-                f"the first and the farthest face of measurement {lines.numbers[np.argmin(bars)]} lie in one place",
-                where=place(points, at, where),
-                fix="Mend its coordinates or reference_mm",
-            )
+        first = "the first and the farthest face of measurement {} lie in one place"
+        for wrong, problem, fix in (
+            (spans <= _SAME_FACE, f"measurement {{}} has a single face, so it tells no length of the {what}",
+             "Record at least two faces of different reference_mm in each measurement, or leave it out"),
+            (bars == 0, first, "Mend its coordinates or reference_mm"),
+        ):  # fmt: skip
+            number = lines.numbers[np.argmax(wrong)]
+            refuse(points, (points.measurement == number) & wrong.any(), where, problem.format(number), fix)
         check_length(float(bars.mean()), float(spans.mean()), "the recorded lines", where)
 
 
@@ -350,9 +341,8 @@ def _planning(
 
         return fitting_pattern
 
-    places = candidates.VolumeCandidates(
-        candidates.along_lines, shape, candidates.RelocatedCandidates(candidates.along_lines)
-    )
+    along = candidates.along_lines
+    places = candidates.VolumeCandidates(along, shape, candidates.RelocatedCandidates(along))
     return Planning({"ISO 10360-2": lines}, places.candidates, places.elsewhere)
 
 

@@ -13,10 +13,9 @@ from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.messages import NOTHING, Text, listed, number, say, semicolons, sentences
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
+from cmm_uq.certificate.plots.residuals import deviations_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.draws import evenly, uncertainty_of_sum
 from cmm_uq.maths.inference.posterior import Doubt
@@ -117,8 +116,6 @@ Stated = tuple[float, float, float]  # standard uncertainty, expanded one and co
 
 @dataclass(frozen=True, eq=False)
 class LineFigures:
-    """One line with what the noise and the certificate leave uncertain of it."""
-
     line: GaugeLine  # as recorded
     position: Text  # in words
     share: float | None  # of the travel along it; ``None`` where no travel is stated
@@ -186,33 +183,29 @@ def results(result: Result) -> dict[str, Any]:
 
 
 def sections(result: Result) -> list[Section]:
-    lines = figures(result)
+    lines, volume = figures(result), residual_volume(result, say("faces"))
     blocks = (
-        _plot(result, cast("StepGauge", result.artefact)), _table(result, lines), *_periodic(lines), *_positions(lines),
-        residual_volume(result, say("faces")),
-    )  # fmt: skip
-    return [Section(say("Deviations along the gauge"), blocks)]
+        _plot(result, cast("StepGauge", result.artefact)),
+        _table(result, lines),
+        _periodic(lines),
+        _positions(lines),
+    )
+    return [section(say("Deviations along the gauge"), *blocks, volume)]
 
 
 def _plot(result: Result, gauge: StepGauge) -> Block:
-    deviations, residuals = gauge.deviations() / MICROMETRE, result.residuals / MICROMETRE
-    noise, lines = result.noise, len(set(gauge.measurement.tolist()))
+    deviations, noise, lines = gauge.deviations() / MICROMETRE, result.noise, len(set(gauge.measurement.tolist()))
     expanded, factor = result.at_least("lines.faces_um", noise.expanded, noise.coverage_factor, unit("µm"))
     what = say("{faces} faces on {lines} lines: as recorded they deviate", faces=len(deviations), lines=lines)
-    return length_plot(
-        _side_by_side(gauge),
-        deviations,
-        residuals,
-        expanded_before_um=expanded,
-        reference=say("certified distance, mean of each line"),
-        flagged=result.flagged,
-        position_label=say("Certified distance from the first face / mm (lines side by side)"),
-        caption=say(
-            "Deviation of each face from its certified distance, as recorded and after the fitted model, with U (k = {k}).",
-            k=number(factor, ".2f"),
-        ),
-        alternative=deviating(what, say("from the mean of their line"), deviations, residuals),
+    caption = say(
+        "Deviation of each face from its certified distance, as recorded and after the fitted model, with U (k = {k}).",
+        k=number(factor, ".2f"),
     )
+    return deviations_plot(
+        result, deviations, what, say("from the mean of their line"), position=_side_by_side(gauge), expanded_um=expanded,
+        reference=say("certified distance, mean of each line"), caption=caption,
+        position_label=say("Certified distance from the first face / mm (lines side by side)"),
+    )  # fmt: skip
 
 
 def _side_by_side(gauge: StepGauge) -> Floats:
@@ -222,7 +215,7 @@ def _side_by_side(gauge: StepGauge) -> Floats:
     return np.asarray(gauge.reference + 0.7 * float(np.diff(faces).min()) * rank, dtype=np.float64)
 
 
-def _table(result: Result, lines: tuple[LineFigures, ...]) -> Table:
+def _table(result: Result, lines: tuple[LineFigures, ...]) -> Table | None:
     both = any(one.gap_um is not None for one in lines)
     rows: list[tuple[Text, ...]] = []
     for one in lines:
@@ -232,12 +225,7 @@ def _table(result: Result, lines: tuple[LineFigures, ...]) -> Table:
         where = (number(line.measurement), one.position, number(line.length, ".10g"), number(line.faces))
         linearity = rounded(line.linearity / MICROMETRE, result.noise.expanded)[0]
         rows.append((*where, *rounded(line.scale_ppm, one.scale_ppm[1]), linearity, *(gap if both else ())))
-    per_metre = figure_columns(say("Slope"), say("U"), unit=unit("µm/m"))
     in_um = (say("Off slope"), *((say("Bidirectional"), say("U")) if both else ()))
-    columns = (
-        *text_columns(say("Line"), say("Position")), Column(say("Length"), unit("mm")), Column(say("Faces")), *per_metre,
-        *figure_columns(*in_um, unit=unit("µm")),
-    )  # fmt: skip
     slope = say(
         "Slope: indicated minus certified distance, over the distance. Off slope: largest deviation of a face from it."
     )
@@ -248,11 +236,15 @@ def _table(result: Result, lines: tuple[LineFigures, ...]) -> Table:
         "U for a coverage probability of 95 %, from the standard uncertainty of a coordinate and how well it is known, "
         "for the slope also from the gauge's certificate; a line by itself, without what the other lines tell."
     )
-    notes = (slope, bidirectional, u) if both else (slope, u)
-    return Table(say("Each line by itself, at 20 °C"), columns, tuple(rows), notes)
+    return table(
+        say("Each line by itself, at 20 °C"),
+        [say("Line"), say("Position"), Column(say("Length"), unit("mm")), Column(say("Faces")),
+         *figure_columns(say("Slope"), say("U"), unit=unit("µm/m")), *figure_columns(*in_um, unit=unit("µm"))],
+        rows, slope, *((bidirectional,) if both else ()), u,
+    )  # fmt: skip
 
 
-def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:
+def _periodic(lines: tuple[LineFigures, ...]) -> Block | None:
     parts = [
         say(
             "line {measurement}: amplitude {amplitude:.2g} µm, period {period:.3g} mm (p = {p_value:.1g})",
@@ -262,28 +254,24 @@ def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:
         for one in lines if (periodic := one.line.periodic) is not None
     ]  # fmt: skip
     text = say("Periodic along the line, beyond what scatter explains: {lines}.", lines=semicolons(parts))
-    return [Paragraph(text)] if parts else []
+    return Paragraph(text) if parts else None
 
 
-def _positions(lines: tuple[LineFigures, ...]) -> list[Block]:
+def _positions(lines: tuple[LineFigures, ...]) -> Block | None:
     short = [
         say("line {measurement} ({share:.0f} %)", measurement=one.line.measurement, share=100 * one.share)
         for one in lines
         if one.share and one.short
     ]
     texts: list[Text] = []
-    if missing := missing_positions(lines):
-        positions = listed(missing)
-        texts.append(say("Not measured of the seven positions of ISO 10360-2:2009: {positions}.", positions=positions))
+    if missing := listed(missing_positions(lines)):
+        texts.append(say("Not measured of the seven positions of ISO 10360-2:2009: {positions}.", positions=missing))
     if short:
-        texts.append(
-            say(
-                "Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {short}.",
-                least=say("{least_share:.0f} %", least_share=100 * ISO_10360_2.least_share),
-                short=listed(short),
-            )
-        )
-    return [Paragraph(sentences(texts), tone="note")] if texts else []
+        least = say("{least_share:.0f} %", least_share=100 * ISO_10360_2.least_share)
+        asked = say("Shorter than the {least} of the travel that ISO 10360-2:2009 asks for: {short}.",
+                    least=least, short=listed(short))  # fmt: skip
+        texts.append(asked)
+    return Paragraph(sentences(texts), tone="note") if texts else None
 
 
 PAGE = Page(sections, results)

@@ -8,7 +8,6 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from cmm_uq.artefacts.axis_runs.kind import APPROACHES, AXIS_RUNS, InterferometerFacts
-from cmm_uq.artefacts.spheres.kind import TABLE_SPHERES
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Number, Numbers, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES
@@ -20,22 +19,20 @@ _HERE = "cmm_uq.artefacts"
 # figures that a laboratory may decide by its own rule
 ERRORS = "error", "mean error", "standard deviation of errors"
 SWEPT = (
-    "repeatability",
-    "span",
-    "standard deviation",
-    "span corrected",
-    "standard deviation corrected",
-    "pivot offset",
-)
+    "repeatability", "span", "standard deviation", "span corrected", "standard deviation corrected", "pivot offset",
+)  # fmt: skip
 
 
-def _kind(name: str, table: type[ArtefactFacts], artefact: str, begin: Beginning, *tested: str, page: str = "") -> Kind:
-    """A kind whose parts are in the module of its artefact (``module:Class``), and its page there or in ``page``."""
-    module, _, _ = artefact.partition(":")
-    screen, plan = f"{_HERE}.{module}:SCREENING", f"{_HERE}.{module}:PLANNING"
+def _kind(
+    name: str, table: type[ArtefactFacts], artefact: str, begin: Beginning | str, *tested: str, page: str = "", plan: str = "",
+    **further: Any,
+) -> Kind:  # fmt: skip
+    """A kind whose parts are in the module of its artefact (``module:Class``), its page and its plan there or elsewhere."""
+    module = artefact.partition(":")[0]
     return Kind(
-        name, table, f"{_HERE}.{artefact}", screen, plan, f"{_HERE}.{page or module}:PAGE", begin, tested=tested
-    )
+        name, table, f"{_HERE}.{artefact}", f"{_HERE}.{module}:SCREENING", f"{_HERE}.{plan or f'{module}:PLANNING'}",
+        f"{_HERE}.{page or module}:PAGE", begin, tested=tested, **further,
+    )  # fmt: skip
 
 
 class BallbarFacts(ArtefactFacts):
@@ -73,16 +70,18 @@ BRYAN = _kind("bryan", ArtefactFacts, "bryan:Bryan", Beginning(
 ), "error", *SWEPT)  # fmt: skip
 
 
+# of what nothing but the lengths of the artefact is in doubt
+_OF_LENGTHS = circumstances(u_cte_per_k=1e-6, u_temperature_k=0.1, u_alignment_um=0.1, u_fixturing_um=0.1)
+
+
 def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str, ...], **others: Any) -> Kind:
     begin = Beginning(
         effects=(*SIX, *effects), recorded=AT_20_C, columns={"reference_mm": ""}, further=dict.fromkeys(further, ""),
-        conformity={"standard": "ISO 10360-2:2009", "mpe": "4 + L/100", "rule": "ISO 14253-1"},
-        test=circumstances(u_cte_per_k=1e-6, u_temperature_k=0.1, u_alignment_um=0.1, u_fixturing_um=0.1),
+        conformity={"standard": "ISO 10360-2:2009", "mpe": "4 + L/100", "rule": "ISO 14253-1"}, test=_OF_LENGTHS,
         plan={"lengths_mm": [20.0, *(100.0 * i for i in range(1, 10))], "repeats": 3}, **others,
     )  # fmt: skip
-    observe, screen, plan = (f"{_HERE}.gauge_lines:{part}" for part in (class_, "SCREENING", name.upper()))
-    page = f"{_HERE}.gauge_lines_page:PAGE"
-    return Kind(name, ReferencedFacts, observe, screen, plan, page, begin, tested=(LENGTHS, *ERRORS))
+    artefact, plan = f"gauge_lines:{class_}", f"gauge_lines:{name.upper()}"
+    return _kind(name, ReferencedFacts, artefact, begin, LENGTHS, *ERRORS, page="gauge_lines_page", plan=plan)
 
 
 NORMALS = ("nx", "ny", "nz")
@@ -136,8 +135,7 @@ TRIANGLE = _kind("triangle", TriangleFacts, "triangle:Triangle", Beginning(
     artefact={"name": "Triangle of gauge blocks and cylinders", "cte_per_k": 11.5e-6,
               "blocks_mm": [380.0, 280.0, 340.0], "u_blocks_um": 0.1, "cylinders_mm": [20.0] * 3, "u_cylinders_um": 0.1},
     plan={"repeats": 3}, further=dict.fromkeys((f"tip_{a}_mm" for a in AXES), ""), noise_um=0.3,
-    conformity=_own_rule("mean error", 2.0, 7, 3, 3), recorded=AT_20_C,
-    test=circumstances(u_cte_per_k=1e-6, u_temperature_k=0.1, u_alignment_um=0.1, u_fixturing_um=0.1),
+    conformity=_own_rule("mean error", 2.0, 7, 3, 3), recorded=AT_20_C, test=_OF_LENGTHS,
 ), *ERRORS, "angle error", "repeatability", page="triangle_page")  # fmt: skip
 
 
@@ -146,8 +144,9 @@ class SphereFacts(ArtefactFacts):
 
     form_key: ClassVar[str | None] = "form_um"
     certified_values: ClassVar[tuple[CertifiedValue, ...]] = (
-        tables.DIAMETER, CertifiedValue("form_um", "", tables.FORM_WORDS, needed=False),
-    )  # fmt: skip
+        tables.DIAMETER,
+        CertifiedValue("form_um", "", tables.FORM_WORDS, needed=False),
+    )
 
     form_um: Uncertainty | None = key(None, "Form deviation of the sphere by its certificate.")
 
@@ -235,26 +234,13 @@ class MultilaterationFacts(InterferometerFacts):
     dead_path_drifts: bool = key(False, "Whether the dead path of each station may drift, in proportion to `time_s`.")
 
 
-_STATIONS = f"{_HERE}.multilateration"
-MULTILATERATION = Kind(
-    "multilateration",
-    MultilaterationFacts,
-    f"{_STATIONS}.artefact:Multilateration",
-    f"{_STATIONS}.artefact:SCREENING",
-    f"{_STATIONS}.artefact:PLANNING",
-    f"{_STATIONS}.page:PAGE",
-    Beginning(
-        title="Distances from four stations of a tracking interferometer",
-        numbering="One measurement is one station with one reflector; its points are the targets, numbered by place.",
-        artefact={"name": "Tracking interferometer", "u_scale_um_per_m": 0.2, "optics_mm": [0.0, 0.0, -120.0]},
-        plan={"grid": [4, 4], "repeats": 1},
-        columns={
-            "reading_mm": "Distance by the interferometer from a zero that is the same for the whole measurement."
-        },
-        further={f"tip_{a}_mm": "" for a in AXES},
-        noise_um=0.3,
-    ),
-)
+MULTILATERATION = _kind("multilateration", MultilaterationFacts, "multilateration.artefact:Multilateration", Beginning(
+    title="Distances from four stations of a tracking interferometer",
+    numbering="One measurement is one station with one reflector; its points are the targets, numbered by place.",
+    artefact={"name": "Tracking interferometer", "u_scale_um_per_m": 0.2, "optics_mm": [0.0, 0.0, -120.0]},
+    plan={"grid": [4, 4], "repeats": 1}, further={f"tip_{a}_mm": "" for a in AXES}, noise_um=0.3,
+    columns={"reading_mm": "Distance by the interferometer from a zero that is the same for the whole measurement."},
+), page="multilateration.page")  # fmt: skip
 
 
 class KnownLength(JobTable):
@@ -361,14 +347,41 @@ SCANNED_PLANES = Kind(
 )
 _TRACKED = f"{_HERE}.optical.tracked"
 TRACKED_POINTS = Kind(
-    "tracked_points",
-    ReferencedFacts,
-    f"{_TRACKED}:TrackedPoints",
-    f"{_TRACKED}:SCREENING",
-    page=f"{_TRACKED}:PAGE",
+    "tracked_points", ReferencedFacts, f"{_TRACKED}:TrackedPoints", f"{_TRACKED}:SCREENING", page=f"{_TRACKED}:PAGE",
     begin=f"{_TRACKED}:BEGIN",
     instead="Choose poses in which every joint moves far; cmm-uq report says by name what they leave open",
-)
+)  # fmt: skip
+
+
+class TableSpheresFacts(ArtefactFacts):
+    """Nothing of the spheres is certified; where they are planned to stand on the table."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    radius_mm: Length = key(200.0, "Distance of both spheres from the table's axis, for a plan.")
+    height_mm: Length = key(200.0, "By how much sphere B lies higher than sphere A along the axis, for a plan.")
+    low_mm: Position = key(0.0, "Height of sphere A above the stated point of the table's axis, for a plan.")
+
+    @property
+    def traced(self) -> bool:
+        return False
+
+
+_TABLE = f"{_HERE}.spheres.table_spheres"
+_AXIS = tuple(f"rotary_{name}" for name in ("location_c_x", "location_c_y", "tilt_c_x", "tilt_c_y", "positioning_c_1"))
+TABLE_SPHERES = Kind(
+    "table_spheres", TableSpheresFacts, f"{_TABLE}:TableSpheres", f"{_TABLE}:SCREENING", f"{_TABLE}:PLANNING",
+    f"{_TABLE}:PAGE", Beginning(
+        title="Two spheres on a turning table (ISO 10360-3)",
+        numbering="One measurement is one load of the table; points 1 and 2 are the centres of spheres A and B, repeat counts "
+        "the positions of the table in their order.",
+        artefact={"name": "Spheres A and B", "radius_mm": 200.0, "height_mm": 200.0}, effects=_AXIS, noise_um=0.3,
+        machine={"chain": "XYZ|C", "origin_mm": [350.0, 500.0, -500.0], "table": {"travel_deg": [0.0, 720.0]}},
+        conformity={"standard": "ISO 10360-3:2000", "characteristic": "FR", "limit_um": 5.0, "rule": "ISO 14253-1"},
+        test=circumstances(u_repeat_um=0.1), columns={"c_deg": ""}, further={"c_approach": ""}, plan={"repeats": 1},
+        recorded=AT_20_C,
+    ), tested=("FR", "FT", "FA"),
+)  # fmt: skip
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
     MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS, TABLE_SPHERES,

@@ -22,13 +22,13 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, in_a_row, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Section, Table, text_columns
+from cmm_uq.certificate.document import Block, Column, Section, Table, section, table
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
-from cmm_uq.machine.model.recorded import place
+from cmm_uq.machine.model.recorded import place, refuse
 from cmm_uq.machine.physics.compensation import DirectionPointError, OffsetPlane, offset_plane
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
@@ -99,10 +99,7 @@ class PlaneSurface(Artefact):
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
         """Flatness of each measurement of four points of contact or more, over all of its repeats."""
         off, contact = self.off_plane(), self.rows[:, 0]
-        each = [
-            np.flatnonzero((self.measurement == number) & counts[contact]) for number in self.placings.numbers.tolist()
-        ]
-        each = [own for own in each if len(own) > LEAST_POINTS]
+        each = [own for rows in self.placings.rows if len(own := rows[counts[contact[rows]]]) > LEAST_POINTS]
         if not each:
             return {}
         rows = np.array([np.resize(contact[own], len(contact)) for own in each])
@@ -115,14 +112,12 @@ class PlaneSurface(Artefact):
         ``u_point`` standard uncertainty of a point of contact along the normal, mm; it counts where there are just
         three, whose scatter nothing shows.
         """
-        found = []
-        off = self.off_plane()
-        for measurement in self.placings.numbers:
-            own = off[self.measurement == measurement]
-            given = u_point if len(own) == LEAST_POINTS else None
-            surface = None if self.offset is None else self._surface(int(measurement), self.offset, given)
-            flatness = float(np.ptp(own)) if len(own) > LEAST_POINTS else None
-            found.append(ProbedPlane(int(measurement), len(own), flatness, surface))
+        found, off = [], self.off_plane()
+        for measurement, rows in zip(self.placings.numbers.tolist(), self.placings.rows, strict=True):
+            more = len(rows) > LEAST_POINTS
+            given = None if more else u_point
+            surface = None if self.offset is None else self._surface(measurement, self.offset, given)
+            found.append(ProbedPlane(measurement, len(rows), float(np.ptp(off[rows])) if more else None, surface))
         return tuple(found)
 
     def _surface(self, measurement: int, offset: float, u_point: float | None) -> OffsetPlane:
@@ -143,19 +138,19 @@ class PlaneSurface(Artefact):
     def _refuse_no_side(self, offset: float, where: str | None) -> None:
         points = self.points
         for measurement in self.placings.numbers:
-            if not len(self._ahead(measurement)):
-                raise CmmUqError(
-                    f"measurement {measurement} has no direction point (point 0), so that nothing says to which side the "
-                    "probe's offset goes",
-                    where=place(points, points.measurement == measurement, where),
-                    fix="Record a point 0 just before contact, or leave out probe_offset_mm",
-                )
+            ahead = self._ahead(measurement)
+            refuse(
+                points, (points.measurement == measurement) & (len(ahead) == 0), where,
+                f"measurement {measurement} has no direction point (point 0), so that nothing says to which side the "
+                "probe's offset goes", "Record a point 0 just before contact, or leave out probe_offset_mm",
+            )  # fmt: skip
             try:
                 self._surface(measurement, offset, 1.0)  # an angle depends on no uncertainty
             except DirectionPointError as rejected:
-                row = np.arange(len(points)) == self._ahead(measurement)[rejected.index]
-                raise CmmUqError(f"measurement {measurement}: {rejected.problem}", where=place(points, row, where),
-                                 fix=rejected.fix) from rejected  # fmt: skip
+                row = np.arange(len(points)) == ahead[rejected.index]
+                raise CmmUqError(
+                    f"measurement {measurement}: {rejected.problem}", where=place(points, row, where), fix=rejected.fix
+                ) from rejected
 
     def off_plane(self) -> Floats:
         """(n,) distance of each point of contact from its least-squares plane, mm."""
@@ -172,24 +167,25 @@ class PlaneSurface(Artefact):
         return np.asarray(axes[self.placings.index], dtype=np.float64)
 
     def _refuse_no_plane(self, where: str | None) -> None:
-        points = self.points
+        points, numbers = self.points, self.placings.numbers
         for measurement in np.setdiff1d(points.measurement, self.measurement):
-            raise CmmUqError(f"measurement {measurement} has no points of contact",
-                             where=place(points, points.measurement == measurement, where),
-                             fix="Points of contact are numbered 1, 2, …; point 0 is the direction point")  # fmt: skip
+            fix = "Points of contact are numbered 1, 2, …; point 0 is the direction point"
+            refuse(
+                points,
+                points.measurement == measurement,
+                where,
+                f"measurement {measurement} has no points of contact",
+                fix,
+            )
         touched = points.xyz[self.rows[:, 0]]
         about = touched - self.placings.means(touched)
         extents = np.linalg.eigvalsh(self.placings.sums(np.einsum("ni,nj->nij", about, about)))
         few = self.placings.sizes < LEAST_POINTS
-        if np.any(poor := few | (extents[:, 1] <= _ON_A_LINE**2 * extents[:, 2])):
-            which = int(np.argmax(poor))
-            measurement, count = self.placings.numbers[which], self.placings.sizes[which]
-            problem = (
-                f"{count} points of contact are too few" if few[which] else "all points of contact lie on one line"
-            )
-            where = place(points, points.measurement == measurement, where)
-            fix = f"Record at least {LEAST_POINTS} points spread over the plane"
-            raise CmmUqError(f"measurement {measurement}: {problem}", where=where, fix=fix)
+        which = int(np.argmax(poor := few | (extents[:, 1] <= _ON_A_LINE**2 * extents[:, 2])))
+        count = f"{self.placings.sizes[which]} points of contact are too few"
+        problem = f"measurement {numbers[which]}: {count if few[which] else 'all points of contact lie on one line'}"
+        rows = (points.measurement == numbers[which]) & poor.any()
+        refuse(points, rows, where, problem, f"Record at least {LEAST_POINTS} points spread over the plane")
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
@@ -264,34 +260,38 @@ def results(result: Result) -> dict[str, Any]:
     for plane in _planes(result):
         flatness = None if plane.flatness is None else plane.flatness / MICROMETRE
         surface = _surface_data(plane.surface, result.noise.coverage_factor)
-        number = plane.measurement
-        planes.append({"measurement": number, "points": plane.count, "flatness_um": flatness, "surface": surface})
+        planes.append(
+            {"measurement": plane.measurement, "points": plane.count, "flatness_um": flatness, "surface": surface}
+        )
     return {"planes": planes}
 
 
 def sections(result: Result) -> list[Section]:
     plane, probed = cast("PlaneSurface", result.artefact), _planes(result)
-    blocks: list[Block] = [_flatness(result, probed), _by_point(result, plane), residual_volume(result, say("points"))]
-    if any(one.surface is not None for one in probed):
-        blocks.insert(1, _surfaces(result, probed))
-    return [Section(say("The plane"), tuple(blocks))]
+    volume = residual_volume(result, say("points"))
+    return [
+        section(
+            say("The plane"), _flatness(result, probed), _surfaces(result, probed), _by_point(result, plane), volume
+        )
+    ]
 
 
-def _flatness(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
+def _flatness(result: Result, probed: tuple[ProbedPlane, ...]) -> Table | None:
     noise = result.noise.coordinate.value
-    rows = tuple(
+    rows = (
         (
-            number(one.measurement), number(one.count),
+            number(one.measurement),
+            number(one.count),
             say("–") if one.flatness is None else rounded(one.flatness / MICROMETRE, noise)[0],
         )
         for one in probed
-    )  # fmt: skip
-    columns = (*text_columns(say("Measurement")), Column(say("Points")), Column(say("Flatness"), unit("µm")))
+    )
     note = say("Flatness: range of the distances from the least-squares plane, of surface, machine and probe together.")
-    return Table(say("Flatness as recorded"), columns, rows, (note,))
+    heads = (say("Measurement"), Column(say("Points")), Column(say("Flatness"), unit("µm")))
+    return table(say("Flatness as recorded"), heads, rows, note)
 
 
-def _surfaces(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
+def _surfaces(result: Result, probed: tuple[ProbedPlane, ...]) -> Table | None:
     rows: list[tuple[Text, ...]] = []
     for one in probed:
         if (surface := one.surface) is None:
@@ -302,29 +302,23 @@ def _surfaces(result: Result, probed: tuple[ProbedPlane, ...]) -> Table:
         U = rounded(0.0, across / MICROMETRE)[1]
         rows.append((number(one.measurement), place, normal, U, number(float(np.degrees(surface.angle)), ".0f")))
     columns = (
-        *text_columns(say("Measurement")), Column(say("Point of the surface"), unit("mm"), numeric=False),
-        *text_columns(say("Outward normal")), Column(say("U across"), unit("µm")), Column(say("Approach"), unit("°")),
+        say("Measurement"), Column(say("Point of the surface"), unit("mm"), numeric=False), say("Outward normal"),
+        Column(say("U across"), unit("µm")), Column(say("Approach"), unit("°")),
     )  # fmt: skip
     note = say(
         "The plane of the probe's centre, moved by the probe's offset against the normal that points to where the probe came "
         "from (US 4,866,643, claim 1). U (k = {k}) of the surface's position along the normal, at its middle.",
         k=number(result.noise.coverage_factor, ".2f"),
     )
-    return Table(say("Surface, compensated for the probe's offset"), columns, tuple(rows), (note,))
+    return table(say("Surface, compensated for the probe's offset"), columns, rows, note)
 
 
 def _by_point(result: Result, plane: PlaneSurface) -> Block:
-    off = plane.off_plane() / MICROMETRE
-    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
+    off, residuals = plane.off_plane() / MICROMETRE, result.residuals / MICROMETRE
     low, high, low_after, high_after = alike(off.min(), off.max(), residuals.min(), residuals.max())
     return length_plot(
-        plane.points.point[plane.rows[:, 0]],
-        off,
-        residuals,
-        expanded_before_um=expanded,
-        reference=say("least-squares plane"),
-        flagged=result.flagged,
-        position_label=say("Point on the plane"),
+        plane.points.point[plane.rows[:, 0]], off, residuals, expanded_before_um=result.noise.expanded,
+        reference=say("least-squares plane"), flagged=result.flagged, position_label=say("Point on the plane"),
         caption=say(
             "Distance of each point from its plane, as recorded and after the fitted model, with U (k = {k}).",
             k=number(result.noise.coverage_factor, ".2f"),
@@ -332,13 +326,9 @@ def _by_point(result: Result, plane: PlaneSurface) -> Block:
         alternative=say(
             "{count} points: as recorded they lie {low} to {high} µm from their plane; after the "
             "fitted model {low_after} to {high_after} µm remain.",
-            count=len(off),
-            low=low,
-            high=high,
-            low_after=low_after,
-            high_after=high_after,
+            count=len(off), low=low, high=high, low_after=low_after, high_after=high_after,
         ),
-    )
+    )  # fmt: skip
 
 
 PAGE = Page(sections, results)

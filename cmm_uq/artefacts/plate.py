@@ -8,9 +8,8 @@ where that is more. Nominal positions leave that scale free.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from math import hypot
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +19,10 @@ from cmm_uq.analysis.planning.set_up import PRINCIPAL_PLANES, Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, body_misfit, rows_by, spread
 from cmm_uq.artefacts.kinds import PlateFacts
-from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, day, number, say, sentences
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.result import Page, Result
@@ -35,7 +33,7 @@ from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Indications, Placings, Size
 from cmm_uq.machine.model.artefact_doubt import CertifiedPlaces, by_certificate, faults, since_earlier
 from cmm_uq.machine.model.placed import Rigid
-from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
+from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, refuse
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_errors import Body
 from cmm_uq.machine.physics.effects.rigid_body import SCALE
@@ -92,7 +90,6 @@ class Plate(Rigid):
 
     @property
     def _since_earlier(self) -> bool:
-        """Whether its references are an earlier recording."""
         return NOISE_RATIO in self.points.columns
 
     def own_faults(self) -> Iterable[Effect]:
@@ -135,13 +132,12 @@ class Plate(Rigid):
         return np.zeros(len(rows), dtype=bool)
 
     def _refuse_another_plate(self, where: str | None) -> None:
-        points, placings = self.points, self.placings
-        nominal, found = self.extents()
-        if np.any(lost := (nominal == 0) | (found == 0)):
-            number = placings.numbers[np.argmax(lost)]
-            problem = f"measurement {number} has no two different balls, so it tells no length of the plate"
-            fix = "Record at least three balls of different reference positions in each measurement, or leave it out"
-            raise CmmUqError(problem, where=place(points, points.measurement == number, where), fix=fix)
+        points, numbers, (nominal, found) = self.points, self.placings.numbers, self.extents()
+        lost = (nominal == 0) | (found == 0)
+        number = numbers[np.argmax(lost)]
+        problem = f"measurement {number} has no two different balls, so it tells no length of the plate"
+        fix = "Record at least three balls of different reference positions in each measurement, or leave it out"
+        refuse(points, (points.measurement == number) & lost.any(), where, problem, fix)
         length = self.sizes[0].nominal
         check_length(float(found.sum() / nominal.sum()) * length, length, self.plural, where)
         self.refuse_another_shape(self.mend, where)
@@ -194,8 +190,7 @@ PLANNING = Planning({"plate placings": plate_placings}, _PLACES.candidates, _PLA
 STEEL = 11.5e-6  # expansion of a plate whose own is not stated, 1/K
 
 
-@dataclass(frozen=True)
-class CommonScale:
+class CommonScale(NamedTuple):
     """The common part of the scales between two dates, and the change of temperature of the plate that looks the same."""
 
     change: Quantity
@@ -203,8 +198,7 @@ class CommonScale:
     warmer: Quantity
 
 
-@dataclass(frozen=True, eq=False)
-class PlateFigures:
+class PlateFigures(NamedTuple):
     """Displacements of all balls before the fitted model, in the plate's own axes, and after it, µm."""
 
     before_um: Floats  # before_um, after_um: (n, 3)
@@ -247,9 +241,11 @@ def results(result: Result) -> dict[str, Any]:
     found = figures(result)
     data: dict[str, Any] = {"placings": found.placings}
     if (common := found.common) is not None:
-        warmer = quantity_data(common.warmer)
-        scale = {"ppm": quantity_data(common.change), "cte_per_k": common.cte_per_k, "plate_warmer_by_k": warmer}
-        data["common_scale"] = scale
+        data["common_scale"] = {
+            "ppm": quantity_data(common.change),
+            "cte_per_k": common.cte_per_k,
+            "plate_warmer_by_k": quantity_data(common.warmer),
+        }
     return data
 
 
@@ -261,14 +257,13 @@ _COMPARED = (say("What changed between the two dates"), say("Now minus then"), s
 def sections(result: Result) -> list[Section]:
     plate, found = cast("Plate", result.artefact), figures(result)
     title, *titles = _COMPARED if compared(result) else _CERTIFIED
-    blocks: list[Block] = [_table(result, found), *_confounded(result, found.common)]
-    blocks += [_arrows(plate, found, one, titles) for one in plate.placings.numbers[:_PLATES_SHOWN].tolist()]
-    return [Section(title, tuple(blocks))]
+    arrows = (_arrows(plate, found, one, titles) for one in plate.placings.numbers[:_PLATES_SHOWN].tolist())
+    return [section(title, _table(result, found), _confounded(result, found.common), *arrows)]
 
 
-def _confounded(result: Result, common: CommonScale | None) -> list[Block]:
+def _confounded(result: Result, common: CommonScale | None) -> Paragraph | None:
     if not compared(result):
-        return []
+        return None
     earlier = result.job.facts.recording.earlier_date
     recording = say("the earlier recording of {date}", date=day(earlier)) if earlier else say("the earlier recording")
     texts: list[Text] = [
@@ -282,24 +277,18 @@ def _confounded(result: Result, common: CommonScale | None) -> list[Block]:
     if common is not None:
         value, U, _ = expanded(common.change)
         kelvin, cte = rounded(abs(common.warmer.value), 2 * common.warmer.u)[0], common.cte_per_k / PPM
+        colder = say(
+            "A plate that was colder by {kelvin} K (at {cte:.3g} ppm/K) than its recorded temperatures account for "
+            "looks the same, and so does one that has shrunk by as much.", kelvin=kelvin, cte=cte,
+        )  # fmt: skip
+        warmer = say(
+            "A plate that was warmer by {kelvin} K (at {cte:.3g} ppm/K) than its recorded temperatures account for "
+            "looks the same, and so does one that has grown by as much.", kelvin=kelvin, cte=cte,
+        )  # fmt: skip
         texts.append(say("The common part of the scales changed by {value} ppm, U = {U} ppm.", value=value, U=U))
-        texts.append(
-            say(
-                "A plate that was colder by {kelvin} K (at {cte:.3g} ppm/K) than its recorded temperatures account for "
-                "looks the same, and so does one that has shrunk by as much.",
-                kelvin=kelvin,
-                cte=cte,
-            )
-            if common.change.value > 0
-            else say(
-                "A plate that was warmer by {kelvin} K (at {cte:.3g} ppm/K) than its recorded temperatures account for "
-                "looks the same, and so does one that has grown by as much.",
-                kelvin=kelvin,
-                cte=cte,
-            )
-        )
+        texts.append(colder if common.change.value > 0 else warmer)
     texts.append(say("A plate that has sheared or bent since looks like squareness or straightness of its plane."))
-    return [Paragraph(sentences(texts))]
+    return Paragraph(sentences(texts))
 
 
 def _arrows(plate: Plate, found: PlateFigures, number: int, titles: Sequence[Text]) -> Block:
@@ -317,8 +306,7 @@ def _arrows(plate: Plate, found: PlateFigures, number: int, titles: Sequence[Tex
     before, after = alike(*(max(hypot(*arrow) for arrow in some.tolist()) for some in arrows))
     first, second = (Verbatim(AXES[axis]) for axis in axes)
     return vector_plot(
-        mean(plate.reference),
-        tuple(zip(titles, arrows, strict=True)),
+        mean(plate.reference), tuple(zip(titles, arrows, strict=True)),
         axis_labels=(say("Plate {first} / mm", first=first), say("Plate {second} / mm", second=second)),
         caption=say(
             "Measurement {measurement}: displacement of each ball in the plane of the plate, placed by least squares.",
@@ -326,25 +314,26 @@ def _arrows(plate: Plate, found: PlateFigures, number: int, titles: Sequence[Tex
         ),
         alternative=say(
             "Arrows at {count} balls: up to {before} µm as recorded, up to {after} µm after the fitted model.",
-            count=len(balls),
-            before=before,
-            after=after,
+            count=len(balls), before=before, after=after,
         ),
-    )
+    )  # fmt: skip
 
 
-def _table(result: Result, found: PlateFigures) -> Table:
-    noise = result.noise.coordinate.value
-    rows = [
-        (number(placing), number(balls), *(rounded(size, noise)[0] for size in sizes))
+def _table(result: Result, found: PlateFigures) -> Table | None:
+    rows = (
+        (number(placing), number(balls), *(rounded(size, result.noise.coordinate.value)[0] for size in sizes))
         for placing, balls, *sizes in (one.values() for one in found.placings)
-    ]
+    )
     sizes = (say("rms before"), say("Largest before"), say("rms after"), say("Largest after"))
-    columns = (*text_columns(say("Placing")), Column(say("Balls")), *figure_columns(*sizes, unit=unit("µm")))
     note = say(
         "Coordinates of every ball minus its reference position, before and after the fitted model; the placing is fitted."
     )
-    return Table(say("Deviation of a coordinate"), columns, tuple(rows), (note,))
+    return table(
+        say("Deviation of a coordinate"),
+        (say("Placing"), Column(say("Balls")), *figure_columns(*sizes, unit=unit("µm"))),
+        rows,
+        note,
+    )
 
 
 PAGE = Page(sections, results)

@@ -10,6 +10,7 @@ a longer lever.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from types import MappingProxyType
@@ -27,16 +28,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.model.artefact import (
-    ArtefactFigure,
-    Indications,
-    Size,
-    figures_of_errors,
-    ranges_of_repeats,
-)
+from cmm_uq.machine.model.artefact import ArtefactFigure, Indications, Size, figures_of_errors, ranges_of_repeats
 from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
 from cmm_uq.machine.model.placed import Rigid
-from cmm_uq.machine.model.recorded import check_length, expansion, place
+from cmm_uq.machine.model.recorded import check_length, expansion, refuse
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_errors import AFFINE, Body
 
@@ -70,8 +65,9 @@ class TriangleStandard:
             said = ", ".join(f"{side:.6g}" for side in sides)
             raise CmmUqError(
                 f"sides of {said} mm do not close to a triangle: the longest is not shorter than the other two together",
-                where="job.toml [artefact] blocks_mm, cylinders_mm", fix="Mend the dimensions of blocks and cylinders",
-            )  # fmt: skip
+                where="job.toml [artefact] blocks_mm, cylinders_mm",
+                fix="Mend the dimensions of blocks and cylinders",
+            )
 
     @classmethod
     def of(cls, facts: TriangleFacts) -> TriangleStandard:
@@ -187,9 +183,7 @@ def placed_triangle(
     )  # fmt: skip
 
 
-_TITLES = (
-    say("Block 1–2"), say("Block 2–3"), say("Block 3–1"), say("Cylinder 1"), say("Cylinder 2"), say("Cylinder 3"),
-)  # fmt: skip
+_TITLES = say("Block 1–2"), say("Block 2–3"), say("Block 3–1"), say("Cylinder 1"), say("Cylinder 2"), say("Cylinder 3")
 
 
 _WRONG_UM = 5.0  # by how much a side may be off whose block or cylinder is another than the job says, µm
@@ -207,17 +201,11 @@ class Triangle(Rigid):
 
     def __init__(self, facts: TriangleFacts, points: Points, *, where: str | None = None) -> None:
         super().__init__(replace(points, machine=replace(points.machine, tip_on_every_carriage=True)))
-        self._facts = facts
-        self.standard = TriangleStandard.of(facts)
-        self.expansion = expansion(facts, points)
+        self._facts, self.standard, self.expansion = facts, TriangleStandard.of(facts), expansion(facts, points)
         _refuse_missing_corners(points, where)
         self._corner = points.point - 1
-        self.sizes = tuple(
-            Size(f"{name}_mm", title, unit("mm"), float(nominal), float(u))
-            for name, title, nominal, u in zip(
-                DIMENSIONS, _TITLES, self.standard.dimensions, self.standard.u, strict=True
-            )
-        )
+        each = zip(DIMENSIONS, _TITLES, self.standard.dimensions.tolist(), self.standard.u.tolist(), strict=True)
+        self.sizes = tuple(Size(f"{name}_mm", title, unit("mm"), nominal, u) for name, title, nominal, u in each)
         self.body = self.shape(self.standard.dimensions)
         nominal, found = self.extents()
         longest = float(self.standard.sides.max())
@@ -267,19 +255,15 @@ class Triangle(Rigid):
 
 
 def _refuse_missing_corners(points: Points, where: str | None) -> None:
-    if np.any(other := ~np.isin(points.point, (1, 2, 3))):
-        raise CmmUqError(f"there is a point {points.point[np.argmax(other)]}: a triangle has 1, 2, 3",
-                         where=place(points, other, where), fix="Number the cylinders as in blocks_mm")  # fmt: skip
-    if np.any(short := np.bincount(points.group)[points.group] < 3):
-        row = int(np.argmax(short))
-        present = points.point[points.group == points.group[row]]
-        missing = sorted({1, 2, 3} - set(present.tolist()))[0]
-        raise CmmUqError(
-            f"measurement {points.measurement[row]}, repeat {points.repeat[row]} has no point {missing}: the triangle does "
-            "not close",
-            where=place(points, short, where),
-            fix="Record all three cylinders, or leave out the measurement",
-        )
+    other = ~np.isin(points.point, (1, 2, 3))
+    problem = f"there is a point {points.point[np.argmax(other)]}: a triangle has 1, 2, 3"
+    refuse(points, other, where, problem, "Number the cylinders as in blocks_mm")
+    short = np.bincount(points.group)[points.group] < 3
+    row = int(np.argmax(short))
+    missing = min({1, 2, 3} - set(points.point[points.group == points.group[row]].tolist()), default=0)
+    whose = f"measurement {points.measurement[row]}, repeat {points.repeat[row]}"
+    problem = f"{whose} has no point {missing}: the triangle does not close"
+    refuse(points, short, where, problem, "Record all three cylinders, or leave out the measurement")
 
 
 def shape_of(facts: TriangleFacts, points: Points) -> ArtefactShape | None:
@@ -295,15 +279,17 @@ SCREENING = Screening(shape_of, balls=True)
 
 
 def triangle_placings(setting: Setting) -> tuple[SetUp, ...]:
-    sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
-    machine = replace(setting.machine, travel_mm=setting.volume.box)
     for placing in SEVEN_PLACINGS:
         places.check_allowed(setting, np.eye(3)[3 - sum(PLANES[placing.plane])], places.ACROSS)
-    points = placed_triangle(machine, sides, repeats=setting.plan.repeats)
-    return tuple(
-        SetUp(placing.title, replace(some.points, machine=setting.machine))
-        for placing, some in zip(SEVEN_PLACINGS, split(points), strict=True)
-    )
+    return tuple(_set_ups(setting, SEVEN_PLACINGS))
+
+
+def _set_ups(setting: Setting, placings: Sequence[Placing]) -> Iterator[SetUp]:
+    sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
+    machine = replace(setting.machine, travel_mm=setting.volume.box)
+    points = placed_triangle(machine, sides, placings, repeats=setting.plan.repeats)
+    for placing, some in zip(placings, split(points), strict=True):
+        yield SetUp(placing.title, replace(some.points, machine=setting.machine))
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
@@ -312,26 +298,16 @@ def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
 
 def _everywhere(setting: Setting) -> Iterator[SetUp]:
     volume = setting.volume
-    sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
-    machine = replace(setting.machine, travel_mm=volume.box)
-    normals = {plane: np.eye(3)[3 - a - b] for plane, (a, b) in PLANES.items()}
-    for plane, normal in normals.items():
-        if not volume.allows(normal):
+    for plane, (a, b) in PLANES.items():
+        if not volume.allows(np.eye(3)[3 - a - b]):
             continue
         named = Verbatim(plane)
         titles = say("in the plane {plane}", plane=named), say("in the plane {plane}, longer tip", plane=named)
-        tipped = [
-            Placing(titles[long], plane, (x, y, z), long)
-            for x, y, z in product(places.THIRDS, repeat=3)
-            for long in (False, True)
-        ]
-        try:
-            points = placed_triangle(machine, sides, tipped, repeats=setting.plan.repeats)
-        except CmmUqError:  # it does not fit this plane
-            continue
-        for placing, some in zip(tipped, split(points), strict=True):
-            if volume.heights[0] <= some.middle[2] <= volume.heights[1]:
-                yield SetUp(placing.title, replace(some.points, machine=setting.machine))
+        at = ((x, y, z, long) for x, y, z in product(places.THIRDS, repeat=3) for long in (False, True))
+        with suppress(CmmUqError):  # it does not fit this plane
+            for set_up in _set_ups(setting, [Placing(titles[long], plane, (x, y, z), long) for x, y, z, long in at]):
+                if volume.heights[0] <= set_up.middle[2] <= volume.heights[1]:
+                    yield set_up
 
 
 PLANNING = Planning(

@@ -24,10 +24,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
-from cmm_uq.certificate.document import Block, Paragraph, Plot, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.plots.residuals import length_plot
+from cmm_uq.certificate.document import Block, Paragraph, Plot, Section, Table, figure_columns, section, table
+from cmm_uq.certificate.plots.residuals import deviations_plot
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating, expanded, refusal
+from cmm_uq.certificate.wording import expanded, refusal
 from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
@@ -79,15 +79,13 @@ def solve_equations(triangle: Triangle) -> TriangleSolution:
         fix = say("Use the fitted model, which serves every chain")
         raise CmmUqError(problem, where="job.toml [machine] chain", fix=fix)
     lower = np.array([machine.travel(axis)[0] for axis in AXES])
-    xyz, dimensions = triangle.points.xyz, triangle.standard.dimensions
+    xyz, dimensions, step = triangle.points.xyz, triangle.standard.dimensions, 1e-3
 
     def solved(at: Floats, sized: Floats) -> Floats:
         return _in_turn(defects(triangle, at, sized), lower)
 
-    values, step = solved(xyz, dimensions), 1e-3
-    changes = [
-        (solved(xyz + step * unit, dimensions) - values) / step for unit in np.eye(xyz.size).reshape(-1, *xyz.shape)
-    ]
+    values, each = solved(xyz, dimensions), step * np.eye(xyz.size).reshape(-1, *xyz.shape)
+    changes = [(solved(xyz + change, dimensions) - values) / step for change in each]
     sized = [(solved(xyz, dimensions + step * unit) - values) / step for unit in np.eye(len(dimensions))]
     return TriangleSolution(values, np.column_stack(changes), np.column_stack(sized))
 
@@ -134,12 +132,10 @@ def _in_turn(found: list[Defects], lower: Floats) -> Floats:
     """The fifteen parameters (15,), each from what is known before it."""
     low, high = _pair(found, "XY", _Z, say("horizontal again, higher, over the same place"))
     left, right = _pair(found, "YZ", _X, say("vertical in YZ again, at the other end of X, with the same tip"))
-    short, long = _pair(
-        found, "YZ", _TIP_X, say("vertical in YZ again, at the same scale readings, with a longer tip along X")
-    )
-    zx, zx_long = _pair(
-        found, "ZX", _TIP_Y, say("vertical in ZX again, at the same scale readings, with a longer tip along Y")
-    )
+    longer_x = say("vertical in YZ again, at the same scale readings, with a longer tip along X")
+    short, long = _pair(found, "YZ", _TIP_X, longer_x)
+    longer_y = say("vertical in ZX again, at the same scale readings, with a longer tip along Y")
+    zx, zx_long = _pair(found, "ZX", _TIP_Y, longer_y)
     c, h = low.base, low.height
     z_low, z_high = (float(d.start[2] + d.tip[2]) for d in (low, high))
     x_left, x_right = (float(d.start[0] + d.tip[0]) for d in (left, right))
@@ -181,15 +177,9 @@ def _pair(found: list[Defects], plane: str, differing: int, missing: Text) -> tu
     alike = np.all(np.delete(apart, differing, axis=2) < _ANOTHER_PLACE, axis=2)
     gain = np.where(alike, apart[:, :, differing], 0.0)
     if not len(own) or gain.max() < _ANOTHER_PLACE:
-        raise CmmUqError(
-            say(
-                "{count} placings in {plane} lack one that the source's equations compare",
-                count=len(own),
-                plane=Verbatim(plane),
-            ),
-            where="recording",
-            fix=say("Add a placing: {missing}", missing=missing),
-        )
+        problem = say("{count} placings in {plane} lack one that the source's equations compare",
+                      count=len(own), plane=Verbatim(plane))  # fmt: skip
+        raise CmmUqError(problem, where="recording", fix=say("Add a placing: {missing}", missing=missing))
     i, j = sorted(np.unravel_index(int(np.argmax(gain)), gain.shape), key=lambda k: float(at[k, differing]))
     return own[i], own[j]
 
@@ -295,52 +285,45 @@ def results(result: Result) -> Mapping[str, Any]:
 
 
 def sections(result: Result) -> list[Section]:
+    ways = _two_ways(result, by_equations(result)), _alike(result)
     return [
-        Section(say("The triangle"), (_standard(*standard_figures(result)), _sides(*sides_of(result)))),
-        Section(say("Parameters by two ways"), (*_two_ways(result, by_equations(result)), *_alike(result))),
+        section(say("The triangle"), _standard(*standard_figures(result)), _sides(result, *sides_of(result))),
+        section(say("Parameters by two ways"), *ways),
     ]
 
 
-def _standard(sides: list[Figure], angles: list[Figure], height: Figure) -> Table:
-    rows: list[tuple[Text, ...]] = [
-        (say("Side {name}", name=Verbatim(name)), *rounded(*side), unit("mm"))
-        for name, side in zip(SIDES, sides, strict=True)
-    ]
+def _standard(sides: list[Figure], angles: list[Figure], height: Figure) -> Table | None:
+    named = [(say("Side {name}", name=Verbatim(name)), side) for name, side in zip(SIDES, sides, strict=True)]
+    rows: list[tuple[Text, ...]] = [(name, *rounded(*side), unit("mm")) for name, side in named]
     for i, (angle, spread) in enumerate(angles, 1):
-        shown = rounded(degrees(angle), degrees(spread))[0]
-        rows.append((say("Angle at {i}", i=i), shown, say("{U}″", U=rounded(0.0, spread / ARCSECOND)[1]), unit("°")))
+        U = say("{U}″", U=rounded(0.0, spread / ARCSECOND)[1])
+        rows.append((say("Angle at {i}", i=i), rounded(degrees(angle), degrees(spread))[0], U, unit("°")))
     rows.append((say("Height over side 1–2"), *rounded(*height), unit("mm")))
-    columns = (*text_columns(say("Quantity")), *figure_columns(say("Value"), say("U")), *text_columns(say("Unit")))
     note = say(
         "U for a coverage probability of 95 % by Monte Carlo, {draws} draws of the dimensions of blocks and cylinders; "
         "angles by the cosine rule.",
         draws=DRAWS,
     )
-    return Table(say("Sides and angles of the standard at 20 °C"), columns, tuple(rows), (note,))
+    figures = figure_columns(say("Value"), say("U"))
+    return table(say("Sides and angles of the standard at 20 °C"), [say("Quantity"), *figures, say("Unit")], rows, note)
 
 
-def _sides(measurement: Ints, sides: Floats, left: Floats, expanded_um: float, k: float) -> Plot:
-    before, after = sides.ravel(), left.ravel()
-    what = say("{count} sides: as recorded they deviate", count=len(before))
-    return length_plot(
-        measurement.repeat(3).astype(float),
-        before,
-        after,
-        expanded_before_um=expanded_um,
-        reference=say("certified side"),
-        position_label=say("Placing (its three sides side by side)"),
-        caption=say(
-            "Each side minus its certified length, as recorded and after the fitted model, with U (k = {k}).",
-            k=number(k, ".2f"),
-        ),
-        alternative=deviating(what, NOTHING, before, after),
+def _sides(result: Result, measurement: Ints, sides: Floats, left: Floats, expanded_um: float, k: float) -> Plot:
+    caption = say(
+        "Each side minus its certified length, as recorded and after the fitted model, with U (k = {k}).",
+        k=number(k, ".2f"),
     )
+    return deviations_plot(
+        result, sides.ravel(), say("{count} sides: as recorded they deviate", count=sides.size),
+        position=measurement.repeat(3).astype(float), after_um=left.ravel(), expanded_um=expanded_um,
+        reference=say("certified side"), position_label=say("Placing (its three sides side by side)"), caption=caption,
+    )  # fmt: skip
 
 
-def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list[Block]:
+def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> Block | None:
     if isinstance(equations, str):
         text = say("The source's equations have no solution here. {equations}", equations=equations)
-        return [Paragraph(text, tone="note")]
+        return Paragraph(text, tone="note")
     rows = []
     for effect, value, _, U, _ in equations:
         fitted: tuple[Text, ...] = (NOTHING, NOTHING)
@@ -349,23 +332,23 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list
             fitted = (say("not determined"), NOTHING) if name in result.free else expanded(quantity)[:2]
         rows.append((effect.title, *rounded(value, U), *fitted, effect.reported[0].unit))
     figures = figure_columns(say("Equations"), say("U"), say("Fitted model"), say("U"))
-    columns = (*text_columns(say("Parameter")), *figures, *text_columns(say("Unit")))
     note = say(
         "Equations: one after the other from the sides of aligned placings (Manlay, Fast checking of "
         "CMM geometry with a patented tool), each from a few of the observations, U for a coverage probability of 95 %, "
         "conditional on white noise. Fitted model: all observations at once, U averaged over what the noise may be."
     )
-    return [Table(say("Scale, squareness, pitch, yaw and roll"), columns, tuple(rows), (note,))]
+    title = say("Scale, squareness, pitch, yaw and roll")
+    return table(title, [say("Parameter"), *figures, say("Unit")], rows, note)
 
 
-def _alike(result: Result) -> list[Block]:
+def _alike(result: Result) -> Block | None:
     titles = {effect.name: effect.title for effect in result.model.effects}
     pairs = [
         say("{one} and {other} ({correlation})", one=titles[a], other=titles[b], correlation=signed(c, "+.2f"))
         for a, b, c in hardly_told_apart(result)
     ]
     text = say("Hardly told apart by these placings (correlation): {pairs}.", pairs=semicolons(pairs))
-    return [Paragraph(text, tone="note")] if pairs else []
+    return Paragraph(text, tone="note") if pairs else None
 
 
 PAGE = Page(sections, results)

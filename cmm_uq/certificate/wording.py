@@ -13,9 +13,8 @@ from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Standing
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every, stated_effects
-from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.effect import Amount, Effect
 from cmm_uq.machine.physics.stated import StatedEffect
-from cmm_uq.machine.physics.words import Amount
 from cmm_uq.maths.uncertainty.quantity import Quantity, figure, limit_in_full, rounded
 
 if TYPE_CHECKING:

@@ -32,7 +32,6 @@ from cmm_uq.artefacts.axis_runs.run import (
     kinds_of,
     profiles,
     reference_shape,
-    refuse,
     reversed_profile,
     roughness,
     runs_of,
@@ -45,12 +44,11 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
-from cmm_uq.machine.model.recorded import expansion
+from cmm_uq.machine.model.recorded import expansion, refuse
 from cmm_uq.machine.physics.effects.drives import index_change
 from cmm_uq.maths.geometry.positioning import CircularTest, PositioningRuns
 
 _FAR = {False: 2000.0, True: 3600.0}  # µm or ″ beyond which a reading is in another unit
-_UNITS = {ACROSS: unit("µm"), TURNING: unit("″")}
 # of the scatter of repeats, and readings off their neighbours, from which on these weigh the kinds of reading against each
 # other; and what ratio of the latter may be chance
 _LEAST_DOF, _LEAST_ROUGH, _ALIKE = 10, 30, 2.0
@@ -94,42 +92,46 @@ class AxisRuns(Artefact):
             elif run.kind == ACROSS and not turned[run.rows].any():
                 free[run.rows, 1] = run.positions / max(float(run.positions.max()), _SAME_MM) - 0.5
         self._base *= expansion(facts, own)
-        columns = (self._zeros.columns(each[:, None]).dense() for each in free.T)
         edges = profiles(own, self.runs)
-        freedoms = np.hstack([*columns, turned, edges])
+        edge = np.any(edges != 0, axis=1)
+        freedoms = np.hstack([*(self._zeros.columns(each[:, None]).dense() for each in free.T), turned, edges])
         self._freedoms = freedoms[:, np.any(freedoms != 0, axis=0)]
         self.readings = self._base - self._seen(points.xyz[:, :, None])[:, 0]
         zero = own.columns[ZERO] - self._zeros.means(self.readings)
         self.readings += np.where(free[:, 0] > 0, zero, 0.0)
         self._profile = reversed_profile(own, self.runs, self.readings, where)
         spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
-        self._length = self._instrument(float(max(spans))) if spans else ()
-        further = list(self._references(square, np.any(edges != 0, axis=1), where))
-        self.exact = tuple(self._taken_as_exact(np.any(edges != 0, axis=1)))
+        self._length: tuple[Size, ...] = ()
+        if spans:
+            span, stated = float(max(spans)), facts.u_scale_um_per_m
+            sd = np.inf if stated is None else MICROMETRE * stated * span / METRE
+            title, what = say("Longest displacement by the instrument"), say("longest displacement")
+            self._length = (Size("length_mm", title, unit("mm"), span, sd, what),)
+        further = list(self._references(square, edge, where))
+        self.exact = tuple(self._taken_as_exact(edge))
         self._shapes = -np.column_stack([shape for _, shape in further]) if further else np.zeros((len(own), 0))
         self.sizes = (*self._length, *(size for size, _ in further))
         self.noise_scale = self._noise_scale()
 
     def _with_ends(self, points: Points, where: str | None) -> Points:
-        """The artefact's own points of a recording."""
         n, runs = len(points), runs_of(points, where)
         kind, (sense, arm) = kinds_of(runs, n), senses_of(runs, n)
-        turned, target = np.flatnonzero(kind == TURNING), np.zeros(n)
-        start = np.zeros(n)
+        turning = kind == TURNING
+        turned, (target, start) = np.flatnonzero(turning), np.zeros((2, n))
         for run in runs:
             target[run.rows], start[run.rows] = run.positions, run.radius or run.start
             if run.kind == CIRCLE:
-                xyz = points.xyz[run.rows]
-                target[run.rows] = run.radius + run.sense @ (xyz - run.radius * run.sense).mean(axis=0)
+                middle = (points.xyz[run.rows] - run.radius * run.sense).mean(axis=0)
+                target[run.rows] = run.radius + run.sense @ middle
         readings = self._in_mm(points, kind, target, where)
         if len(points.lines):
             refuse_denied(points, runs, readings, where)
         for run in runs if len(points.lines) else ():
-            at = run.positions + run.start
-            outside = [t for t in self._targets(run) if not at.min() - _SAME_MM <= t <= at.max() + _SAME_MM]
+            low, high = (float(end(run.positions + run.start)) for end in (np.min, np.max))
+            outside = [t for t in self._targets(run) if not low - _SAME_MM <= t <= high + _SAME_MM]
             if outside:
                 problem = f"target {outside[0]:g} mm lies outside the readings of measurement {run.measurement}"
-                fix = f"Name targets from {at.min():g} to {at.max():g} mm"
+                fix = f"Name targets from {low:g} to {high:g} mm"
                 raise CmmUqError(problem, where=f"job.toml [artefact.on_the_fly] {run.axis}", fix=fix)
         zero = self._zeros_of(points).means(readings)
         if self._facts.u_bar_um is not None:
@@ -140,12 +142,12 @@ class AxisRuns(Artefact):
         tip = np.vstack([given, (given + self._facts.arm_mm * arm)[turned]])
         whole = points.select(np.concatenate([np.arange(n), turned]))
         xyz = whole.xyz.copy()
-        xyz[:n][kind != TURNING] -= shift[kind != TURNING]
+        xyz[:n][~turning] -= shift[~turning]
         xyz[n:] -= shift[turned]
-        read = np.where((kind == TURNING)[:, None], 0.0, sense)
-        about = np.where((kind == TURNING)[:, None], np.cross(arm, sense), 0.0)
-        more = {END: (np.arange(len(whole)) >= n).astype(np.float64), TARGET: np.append(target, target[turned])}
-        more |= {START: np.append(start, start[turned]), ZERO: np.append(zero, zero[turned])}
+        read = np.where(turning[:, None], 0.0, sense)
+        about = np.where(turning[:, None], np.cross(arm, sense), 0.0)
+        more = {name: np.append(each, each[turned]) for name, each in ((TARGET, target), (START, start), (ZERO, zero))}
+        more |= {END: (np.arange(len(whole)) >= n).astype(np.float64)}
         for names, values in ((READ, read), (TURN, about)):
             more |= dict(zip(names, np.vstack([values, values[turned]]).T, strict=True))
         more |= {f"tip_{a}_mm": tip[:, i] for i, a in enumerate(AXES)}
@@ -160,30 +162,22 @@ class AxisRuns(Artefact):
     def _in_mm(self, points: Points, kind: NDArray[Any], target: Floats, where: str | None) -> Floats:
         """Readings (n,), mm; of a rotation times the arm."""
         turning, found = kind == TURNING, np.zeros(len(points))
-        for turns, rows in ((False, ~turning), (True, turning)):
-            name = READINGS[turns]
+        for turns, rows, what in ((False, ~turning, "displacements"), (True, turning, "rotations")):
+            name, other = READINGS[turns], READINGS[not turns]
             if name not in points.columns and rows.any() and len(points.lines):
-                what = "rotations" if turns else "displacements"
-                raise CmmUqError(
+                problem, fix = (
                     f"no column {name!r}, which readings of {what} need",
-                    where=where or "recording",
-                    fix=f"Add the column {name}, 0 in the rows of other readings",
+                    f"Add the column {name}, 0 in the rows of",
                 )
+                raise CmmUqError(problem, where=where or "recording", fix=f"{fix} other readings")
             values = points.columns.get(name, np.zeros(len(points)))
-            refuse(
-                points,
-                rows & (np.abs(values) > _FAR[turns]),
-                where,
-                f"{name} beyond what any machine errs by",
-                "Convert it: µm of a displacement less its target, ″ of a rotation (1 µm/m is 0.2063″)",
-            )
-            refuse(
-                points,
-                ~rows & (values != 0),
-                where,
+            fix = "Convert it: µm of a displacement less its target, ″ of a rotation (1 µm/m is 0.2063″)"
+            refuse(points, rows & (np.abs(values) > _FAR[turns]), where, f"{name} beyond what any machine errs by", fix)
+            problem, fix = (
                 f"{name} is not 0, and something else is read there",
-                f"Put it into {READINGS[not turns]}, or mend read_x … turn_z",
+                f"Put it into {other}, or mend read_x … turn_z",
             )
+            refuse(points, ~rows & (values != 0), where, problem, fix)
             found[rows] = self._factor(turns=turns) * values[rows]
         if not self._facts.air_corrected:
             found -= np.where(kind == ALONG, index_change(points) * (target + self._facts.dead_path_mm), 0.0)
@@ -193,47 +187,28 @@ class AxisRuns(Artefact):
         """A reading's unit, mm."""
         return ARCSECOND * self._facts.arm_mm if turns else MICROMETRE
 
-    def _instrument(self, span: float) -> tuple[Size, ...]:
-        stated = self._facts.u_scale_um_per_m
-        sd = np.inf if stated is None else MICROMETRE * stated * span / METRE
-        title = say("Longest displacement by the instrument")
-        return (Size("length_mm", title, unit("mm"), span, sd, say("longest displacement")),)
-
     def _references(self, square: Floats, edge: Any, where: str | None) -> Iterator[tuple[Size, Floats]]:
         """What is stated of what the instrument reads against, and what (n,) of the readings each changes, mm per unit."""
-        facts, n = self._facts, len(square)
+        facts = self._facts
         if square.any():
             if facts.u_square_arcsec is None:
                 fix = "State it (k = 1) in [artefact], or leave the column square out"
                 raise CmmUqError("runs against a square, and no u_square_arcsec", where=where, fix=fix)
-            title = say("Square's angle less 90°")
-            nominal, u = facts.square_arcsec, facts.u_square_arcsec
-            yield Size("square_arcsec", title, unit("″"), nominal, u, role="set-up"), ARCSECOND * square
+            title, known = say("Square's angle less 90°"), (facts.square_arcsec, facts.u_square_arcsec)
+            yield Size("square_arcsec", title, unit("″"), *known, role="set-up"), ARCSECOND * square
         circles = np.where(self._kind == CIRCLE, -MICROMETRE, 0.0)
         if facts.u_bar_um is not None and circles.any():
-            yield (
-                Size(
-                    "bar_um",
-                    say("Length of the ballbar less its certified one"),
-                    unit("µm"),
-                    0.0,
-                    facts.u_bar_um,
-                    role="set-up",
-                ),
-                circles,
-            )
+            title = say("Length of the ballbar less its certified one")
+            yield Size("bar_um", title, unit("µm"), 0.0, facts.u_bar_um, role="set-up"), circles
         for run in self.runs:
             stated = {ACROSS: facts.u_straightness_um, TURNING: facts.u_rotation_arcsec}.get(run.kind)
             if stated is None or edge[run.rows].any():
                 continue
-            shape = np.zeros(n)
-            shape[run.rows] = self._factor(turns=run.kind == TURNING) * reference_shape(run, run.positions)
+            shape, turns = np.zeros(len(square)), run.kind == TURNING
+            shape[run.rows] = self._factor(turns=turns) * reference_shape(run, run.positions)
             title = say("Reference of measurement {number}", number=run.measurement)
-            symbol = "arcsec" if run.kind == TURNING else "um"
-            yield (
-                Size(f"reference_{run.measurement}_{symbol}", title, _UNITS[run.kind], 0.0, stated, role="set-up"),
-                shape,
-            )
+            name = f"reference_{run.measurement}_{'arcsec' if turns else 'um'}"
+            yield Size(name, title, unit("″" if turns else "µm"), 0.0, stated, role="set-up"), shape
 
     def _taken_as_exact(self, edge: Any) -> Iterator[tuple[Text, NDArray[np.bool_]]]:
         """References of kinds of reading, each but a straightedge turned over, of which the job states no uncertainty."""

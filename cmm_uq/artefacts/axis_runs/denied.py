@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cmm_uq.artefacts.axis_runs.run import ACROSS, CIRCLE, SQUARE, STRAIGHTEDGE, TURNING, Run, refuse, vectors
+from cmm_uq.artefacts.axis_runs.run import ACROSS, CIRCLE, SQUARE, STRAIGHTEDGE, TURNING, Run, vectors
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND
+from cmm_uq.machine.model.recorded import refuse
 
 _SAME_MM = 1e-6
 _OPPOSITE = 16.0  # how much nearer a repeat is to the others with its sign changed, in squares, to be one turned over

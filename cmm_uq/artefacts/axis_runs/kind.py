@@ -79,32 +79,24 @@ class AxisRunsFacts(InterferometerFacts):
     on_the_fly: OnTheFly | None = key(None, "Readings taken in motion, evaluated at targets of these.")
 
 
+_HYSTERESES = tuple(f"hysteresis_{a}" for a in AXES)
 CIRCLES = Beginning(
     title="Circles in three planes by telescoping ballbar (ISO 230-4)",
     numbering="One measurement is one circle; its points go round it, and back.",
     artefact={"name": "Telescoping ballbar", "u_bar_um": 0.5, "cte_per_k": 11.5e-6},
-    effects=(*SIX, "hysteresis_x", "hysteresis_y", "hysteresis_z"),
-    plan={"ready": "circles", "repeats": 1, "length_mm": 300.0},
-    recorded=AT_20_C,
+    effects=(*SIX, *_HYSTERESES), plan={"ready": "circles", "repeats": 1, "length_mm": 300.0}, recorded=AT_20_C,
     conformity={"standard": "ISO 230-4:1996", "characteristic": "G", "limit_um": 15.0, "rule": "ISO 14253-1"},
-    test=circumstances(u_alignment_um=0.1, u_temperature_k=0.1, u_repeat_um=0.2),
-    noise_um=0.3,
-)
+    test=circumstances(u_alignment_um=0.1, u_temperature_k=0.1, u_repeat_um=0.2), noise_um=0.3,
+)  # fmt: skip
 _RUNS = "cmm_uq.artefacts.axis_runs"
 AXIS_RUNS = Kind(
-    "axis_runs",
-    AxisRunsFacts,
-    f"{_RUNS}.artefact:AxisRuns",
-    f"{_RUNS}.plan:SCREENING",
-    f"{_RUNS}.plan:PLANNING",
+    "axis_runs", AxisRunsFacts, f"{_RUNS}.artefact:AxisRuns", f"{_RUNS}.plan:SCREENING", f"{_RUNS}.plan:PLANNING",
     f"{_RUNS}.page:PAGE",
     Beginning(
         title="Runs along three axes by laser interferometer and angular optics (ISO 230-2)",
         numbering="One measurement is one quantity along one line; its points are the targets, again on the way back.",
-        artefact={"name": "Laser interferometer", "u_scale_um_per_m": 0.3},
-        effects=("scale_x", "scale_y", "scale_z", "hysteresis_x", "hysteresis_y", "hysteresis_z"),
-        plan={"repeats": 5},
-        recorded=AT_20_C,
+        artefact={"name": "Laser interferometer", "u_scale_um_per_m": 0.3}, effects=(*SIX[:3], *_HYSTERESES),
+        plan={"repeats": 5}, recorded=AT_20_C, noise_um=0.3,
         columns={
             "reading_um": "Displacement by the instrument less that of the target; 0 where a rotation is read.",
             "reading_arcsec": "Rotation by the instrument, by the right hand; 0 where a displacement is read.",
@@ -113,8 +105,7 @@ AXIS_RUNS = Kind(
         },
         conformity={"standard": "ISO 230-2:2014", "limit_um": 10.0, "rule": "ISO 14253-1"},
         test=circumstances(
-            u_alignment_um=0.2,
-            u_repeat_um=0.1,
+            u_alignment_um=0.2, u_repeat_um=0.1,
             negligible={"temperature": {"by": "the laboratory", "reason": "light does not expand"}},
         ),
         further={
@@ -122,8 +113,6 @@ AXIS_RUNS = Kind(
             "straightedge": "+1 against a straightedge as it lies first, −1 against it turned over, 0 without one.",
             "square": "Number of the setting of a square, the same along both of its legs; 0 without one.",
         },
-        noise_um=0.3,
     ),
-    begin_also={"circular_test": f"{_RUNS}.kind:CIRCLES"},
-    tested=(POSITIONING,),
-)
+    begin_also={"circular_test": f"{_RUNS}.kind:CIRCLES"}, tested=(POSITIONING,),
+)  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, cast
 
@@ -14,7 +14,7 @@ from cmm_uq.artefacts.axis_runs.run import CIRCLE, SQUARE, TURNING, Run
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, table, text_columns
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.plots.residuals import positioning_plot, readings_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
@@ -23,6 +23,7 @@ from cmm_uq.maths.uncertainty.quantity import nominal, rounded
 
 COVERAGE = 2.0  # of U of the figures (ISO/TR 230-9)
 Spread = Mapping[str, float]
+Evaluated = Sequence[tuple[Run, PositioningRuns, Spread]]
 
 
 def _evaluated(result: Result) -> list[tuple[Run, PositioningRuns | MissingReadingError, Spread]]:
@@ -39,32 +40,24 @@ def _evaluated(result: Result) -> list[tuple[Run, PositioningRuns | MissingReadi
 
 
 def missing_words(run: Run, error: MissingReadingError) -> Text:
-    """Why a run has no figures."""
     way = {1.0: say("in the positive direction"), -1.0: say("in the negative direction")}.get(error.direction, NOTHING)
-    if error.gap:
-        why = say("lies outside the readings of repeat {repeat}", repeat=error.repeat)
-        if np.isfinite(error.gap):
-            why = say(
-                "lies between readings of repeat {repeat} that are {gap:.3g} mm apart, more than {most:.3g} mm",
-                repeat=error.repeat,
-                gap=error.gap,
-                most=error.most,
-            )
+    if not error.gap:
         return say(
-            "measurement {number} is not evaluated: target {target:g} mm {way} {why}",
-            number=run.measurement,
-            target=error.target,
-            way=way,
-            why=why,
+            "measurement {number} is not evaluated: target {target:g} mm {way} has {count} readings in repeat {repeat}, "
+            "not one", number=run.measurement, target=error.target, way=way, count=error.count, repeat=error.repeat,
+        )  # fmt: skip
+    why = say("lies outside the readings of repeat {repeat}", repeat=error.repeat)
+    if np.isfinite(error.gap):
+        why = say(
+            "lies between readings of repeat {repeat} that are {gap:.3g} mm apart, more than {most:.3g} mm",
+            repeat=error.repeat,
+            gap=error.gap,
+            most=error.most,
         )
     return say(
-        "measurement {number} is not evaluated: target {target:g} mm {way} has {count} readings in repeat {repeat}, not one",
-        number=run.measurement,
-        target=error.target,
-        way=way,
-        count=error.count,
-        repeat=error.repeat,
-    )
+        "measurement {number} is not evaluated: target {target:g} mm {way} {why}",
+        number=run.measurement, target=error.target, way=way, why=why,
+    )  # fmt: skip
 
 
 def _unit(run: Run) -> Text:
@@ -86,8 +79,9 @@ def results(result: Result) -> dict[str, Any]:
             "angles_deg" if run.kind == CIRCLE else "targets_mm": found.targets.tolist(),
             "directions": by_way,
             "reversal": found.reversal.tolist(),
+            "figures": dict(found.figures()),
+            "U": {name: COVERAGE * u for name, u in spread.items()},
         }
-        told |= {"figures": dict(found.figures()), "U": {name: COVERAGE * u for name, u in spread.items()}}
         if (motion := found.motion) is not None:
             told["in_motion"] = {
                 "widest_gap_mm": motion.widest_gap,
@@ -116,111 +110,77 @@ def sections(result: Result) -> list[Section]:
     every = _evaluated(result)
     whole = [(run, found, spread) for run, found, spread in every if isinstance(found, PositioningRuns)]
     straight = [each for each in whole if each[0].kind != CIRCLE]
-    round_ = [each for each in whole if each[0].kind == CIRCLE]
-    blocks: list[Block | None] = [_both(straight), _each_way(straight), _in_motion(straight), *_circles(round_)]
-    blocks += [
-        Paragraph(say("{why:capital}.", why=missing_words(run, found)))
-        for run, found, _ in every
-        if isinstance(found, MissingReadingError)
-    ]
-    blocks.append(
-        Paragraph(
-            say(
-                "No run reads {errors}: in what is said of all errors together these keep what physics allows of them.",
-                errors=commas(map(Verbatim, _not_read(result))),
-            )
-        )
+    each_way = [f"{figure}{arrow}" for figure in "AER" for arrow in "↑↓"]
+    missing = (missing_words(run, found) for run, found, _ in every if isinstance(found, MissingReadingError))
+    unseen = say(
+        "No run reads {errors}: in what is said of all errors together these keep what physics allows of them.",
+        errors=commas(map(Verbatim, _not_read(result))),
     )
-    blocks += [_readings(result), residual_volume(result, say("positions"))]
-    targets = Section(
-        say("Target by target"), tuple(block for run, found, _ in whole for block in _targets(run, found))
-    )
-    return [Section(say("Runs along the axes"), tuple(block for block in blocks if block is not None)), targets]
+    return [
+        section(
+            say("Runs along the axes"), _both(straight),
+            _table(say("Each direction by itself"), each_way, straight), _in_motion(straight),
+            *_circles([each for each in whole if each[0].kind == CIRCLE]),
+            *(Paragraph(say("{why:capital}.", why=why)) for why in missing), Paragraph(unseen), _readings(result),
+            residual_volume(result, say("positions")),
+        ),
+        section(say("Target by target"), *(block for run, found, _ in whole for block in _targets(run, found))),
+    ]  # fmt: skip
 
 
-def _cells(found: PositioningRuns, names: list[str], spread: Spread, scale: float) -> list[Text]:
+def _cells(found: PositioningRuns, names: list[str], spread: Spread) -> Iterator[Text]:
     figures = found.figures()
-    cells: list[Text] = []
     for name in names:
         if name not in figures:
-            cells.append(say("–"))
-        elif name in spread and spread[name] > 0:
+            yield say("–")
+        elif spread.get(name, 0.0) > 0:
             value, expanded = rounded(figures[name], COVERAGE * spread[name])
-            cells.append(say("{value} ± {U}", value=value, U=expanded))
+            yield say("{value} ± {U}", value=value, U=expanded)
         else:
-            cells.append(rounded(figures[name], scale)[0])
-    return cells
+            yield rounded(figures[name], 0.1)[0]
 
 
-def _table(
-    caption: Text, names: list[str], whole: list[tuple[Run, PositioningRuns, Spread]], notes: tuple[Text, ...]
-) -> Table | None:
-    rows = [
-        (number(run.measurement), run.quantity, _unit(run), *_cells(found, names, spread, 0.1))
+def _table(caption: Text, names: list[str], whole: Evaluated, *notes: Text) -> Table | None:
+    rows = (
+        (number(run.measurement), run.quantity, _unit(run), *_cells(found, names, spread))
         for run, found, spread in whole
-    ]
-    figures = [Column(say("mean B") if name == "mean B" else Verbatim(name)) for name in names]
-    heads = [*text_columns(say("Measurement"), say("Quantity"), say("Unit")), *figures]
-    return table(caption, heads, rows, *notes)
+    )
+    figures = (Column(say("mean B") if name == "mean B" else Verbatim(name)) for name in names)
+    return table(caption, [say("Measurement"), say("Quantity"), say("Unit"), *figures], rows, *notes)
 
 
-def _both(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
+def _both(whole: Evaluated) -> Table | None:
+    without = say(
+        "Figures without U, as those of straightnesses and rotations: no test uncertainty is stated of what reads them."
+    )
     return _table(
-        say("Both directions, by ISO 230-2:2014"),
-        ["A", "E", "R", "B", "mean B", "M"],
-        whole,
-        (
-            say(
-                "A accuracy, E systematic deviation, R repeatability, B reversal, M range of mean deviations. Straightnesses "
-                "less a straight line, and rotations, are evaluated by the same formulas (ISO 230-1)."
-            ),
-            say(
-                "Quantities as VDI/VDE 2617 writes them: the carriage, t for a displacement or r for a rotation, and its axis."
-            ),
-            say(
-                "± U (k = 2): test uncertainty as ISO/TR 230-9 has it, of the instrument's scale, alignment, temperature and "
-                "what changes between readings, as far as stated; the machine's own scatter is in the figures, not in U."
-            ),
-            say(
-                "Figures without U, as those of straightnesses and rotations: no test uncertainty is stated of what reads "
-                "them."
-            )
-            if not all(spread for *_, spread in whole)
-            else NOTHING,
+        say("Both directions, by ISO 230-2:2014"), ["A", "E", "R", "B", "mean B", "M"], whole,
+        say(
+            "A accuracy, E systematic deviation, R repeatability, B reversal, M range of mean deviations. Straightnesses "
+            "less a straight line, and rotations, are evaluated by the same formulas (ISO 230-1)."
         ),
-    )
+        say("Quantities as VDI/VDE 2617 writes them: the carriage, t for a displacement or r for a rotation, and its axis."),
+        say(
+            "± U (k = 2): test uncertainty as ISO/TR 230-9 has it, of the instrument's scale, alignment, temperature and "
+            "what changes between readings, as far as stated; the machine's own scatter is in the figures, not in U."
+        ),
+        NOTHING if all(spread for *_, spread in whole) else without,
+    )  # fmt: skip
 
 
-def _each_way(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
-    names = [f"{figure}{arrow}" for figure in "AER" for arrow in "↑↓"]
-    return _table(say("Each direction by itself"), names, whole, ())
-
-
-def _in_motion(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None:
-    rows = tuple(
+def _in_motion(whole: Evaluated) -> Table | None:
+    rows = (
         (
-            number(run.measurement),
-            run.quantity,
-            number(motion.widest_gap, ".3g"),
-            number(float(np.sqrt(np.mean(motion.share**2))), ".2f"),
-            number(float(np.abs(motion.curvature).max()), ".2g"),
-            say("–") if motion.u_delay is None else number(motion.u_delay, ".2g"),
-            _unit(run),
+            number(run.measurement), run.quantity, number(motion.widest_gap, ".3g"),
+            number(float(np.sqrt(np.mean(motion.share**2))), ".2f"), number(float(np.abs(motion.curvature).max()), ".2g"),
+            say("–") if motion.u_delay is None else number(motion.u_delay, ".2g"), _unit(run),
         )
-        for run, found, _ in whole
-        if (motion := found.motion) is not None
-    )
-    heads = [
-        *text_columns(say("Measurement"), say("Quantity")),
-        Column(say("Widest gap"), unit("mm")),
-        Column(say("Part of noise")),
-        Column(say("Linear less cubic")),
-        Column(say("u of delay")),
-        *text_columns(say("Unit")),
-    ]
+        for run, found, _ in whole if (motion := found.motion) is not None
+    )  # fmt: skip
+    figures = figure_columns(say("Part of noise"), say("Linear less cubic"), say("u of delay"))
     return table(
         say("Readings in motion, interpolated at targets"),
-        heads,
+        [say("Measurement"), say("Quantity"), Column(say("Widest gap"), unit("mm")), *figures, say("Unit")],
         rows,
         say(
             "Deviations at targets are interpolated linearly between the two readings next to each, of the same repeat and "
@@ -235,29 +195,21 @@ def _in_motion(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Table | None
     )
 
 
-def _circles(whole: list[tuple[Run, PositioningRuns, Spread]]) -> Iterator[Table | None]:
+def _circles(whole: Evaluated) -> Iterator[Table | None]:
     yield _table(
         say("Circles, by ISO 230-4"),
         ["G↺", "G↻", "H", "G(b)"],
         whole,
-        (
-            say(
-                "G circular deviation, by the minimum zone, ↺ counter-clockwise about the positive axis; H circular "
-                "hysteresis (1996); G(b) bidirectional circular deviation (2005). Of several rounds the largest."
-            ),
+        say(
+            "G circular deviation, by the minimum zone, ↺ counter-clockwise about the positive axis; H circular "
+            "hysteresis (1996); G(b) bidirectional circular deviation (2005). Of several rounds the largest."
         ),
     )
     known = [each for each in whole if {"Fmax", "D"} & set(each[1].figures())]
-    yield _table(
-        say("Radial deviations, by ISO 230-4"),
-        ["Fmax", "Fmin", "D"],
-        known,
-        (
-            say(
-                "F radial deviation about the least-squares centre (1996), D mean bidirectional radial deviation (2005)."
-            ),
-        ),
+    what = say(
+        "F radial deviation about the least-squares centre (1996), D mean bidirectional radial deviation (2005)."
     )
+    yield _table(say("Radial deviations, by ISO 230-4"), ["Fmax", "Fmin", "D"], known, what)
 
 
 def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
@@ -274,25 +226,22 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
         return
     ways = {"↑": (say("Mean ↑"), say("s ↑")), "↓": (say("Mean ↓"), say("s ↓"))}
     heads = [*(head for arrow in found.arrows for head in ways[arrow]), say("Reversal")]
-    columns = [values for way in zip(found.mean, found.s, strict=True) for values in way]
-    columns += [found.reversal] if found.both else []
+    columns = [*(values for way in zip(found.mean, found.s, strict=True) for values in way), found.reversal]
+    shown = list(zip(heads, columns, strict=True))[: None if found.both else -1]
     rows = tuple(
         (
             nominal(float(target)),
-            *(say("–") if np.isnan(c[i]) else signed(round(c[i], 2) + 0.0, ".2f") for c in columns),
+            *(say("–") if np.isnan(c[i]) else signed(round(c[i], 2) + 0.0, ".2f") for _, c in shown),
         )
         for i, target in enumerate(found.targets)
     )
-    columns_of = (Column(say("Target"), unit("mm")), *figure_columns(*heads[: len(columns)], unit=own))
+    columns_of = (Column(say("Target"), unit("mm")), *figure_columns(*(head for head, _ in shown), unit=own))
     if found.repeats == 1:
         yield Table(title, columns_of, rows)
         return
-    caption = say(
-        "{title}: means of {repeats} repeats, filled in the positive direction, with ±2s.",
-        title=title,
-        repeats=found.repeats,
-    )
-    yield picture(label=say("Target / mm"), caption=caption)
+    means = say("{title}: means of {repeats} repeats, filled in the positive direction, with ±2s.",
+                title=title, repeats=found.repeats)  # fmt: skip
+    yield picture(label=say("Target / mm"), caption=means)
     drift = number(float(np.abs(found.drift).max()), ".2g")
     drifts = say("The mean of a repeat differs from that of all by up to {drift} {unit}.", drift=drift, unit=own)
     yield Table(title, columns_of, rows, (drifts,))

@@ -44,7 +44,6 @@ def _misfit(xyz: Floats, _: Floats, __: float) -> Floats:
 
 
 def _off_circle(xyz: Floats) -> Floats:
-    """Distance of each position from the circle that most are on."""
     middle = np.median(xyz, axis=0)
     plane, keep = np.linalg.svd(xyz - middle, full_matrices=False)[2], np.ones(len(xyz), dtype=bool)
     for _ in range(3):
@@ -59,7 +58,6 @@ def _off_circle(xyz: Floats) -> Floats:
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
-    """Runs along straight lines."""
     rows = rows_by(points.measurement)
     extent = float(np.median([np.linalg.norm(np.ptp(points.xyz[each], axis=0)) for each in rows]))
     return ArtefactShape(rows, _misfit, np.nan, extent, reference=no_references(points)) if extent else None

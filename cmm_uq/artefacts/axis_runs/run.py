@@ -16,7 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import METRE
-from cmm_uq.machine.model.recorded import place
+from cmm_uq.machine.model.recorded import refuse
 
 ALONG, ACROSS, TURNING, CIRCLE = "along", "across", "turning", "circle"
 READINGS = {False: "reading_um", True: "reading_arcsec"}  # by whether a rotation is read
@@ -218,11 +218,6 @@ def _arm(run: Run) -> Floats:
     return np.asarray(along / np.linalg.norm(along))
 
 
-def refuse(points: Points, rows: NDArray[np.bool_], where: str | None, problem: str, fix: str) -> None:
-    if np.any(rows):
-        raise CmmUqError(problem, where=place(points, rows, where), fix=fix)
-
-
 def vectors(points: Points, names: tuple[str, ...]) -> Floats:
     """(n, 3) of columns, those that are not there being zero."""
     return np.column_stack([points.columns.get(name, np.zeros(len(points))) for name in names])
@@ -257,80 +252,53 @@ def _circle(points: Points, number: int, rows: Ints, senses: Floats) -> Run | No
 
 def runs_of(points: Points, where: str | None) -> tuple[Run, ...]:
     """The runs of a recording; what is none is refused."""
+    numbers = zip(np.unique(points.measurement).tolist(), rows_by(points.measurement), strict=True)
+    return tuple(_run(points, number, rows, where) for number, rows in numbers)
+
+
+def _run(points: Points, number: int, rows: Ints, where: str | None) -> Run:
+    own, xyz, whose = points.measurement == number, points.xyz[rows], f"measurement {number}"
+
+    def check(wrong: bool | NDArray[np.bool_], problem: str, fix: str) -> None:
+        refuse(points, own & wrong, where, problem, fix)
+
+    travel = xyz[int(np.argmax(np.linalg.norm(xyz - xyz[0], axis=1)))] - xyz[0]
+    length = float(np.linalg.norm(travel))
+    still = f"{whose} stands still: all its positions are one"
+    check(length < _SAME_MM, still, "Give the position of every reading as x_mm, y_mm, z_mm")
+    far = np.ptp(xyz, axis=0) / np.ptp(points.machine.travel_mm, axis=1)
+    beyond = f"{whose} goes {far.max():.3g} times the travel of {AXES[int(far.argmax())].upper()}"
+    check(bool(far.max() > _BEYOND), beyond, "Give positions in mm, or mend travel_mm in [machine]")
+    travel = travel / length
+    travel = travel * np.sign(travel[int(np.argmax(np.abs(travel)))])
     read, turn = vectors(points, READ), vectors(points, TURN)
-    found = []
-    for number, rows in zip(np.unique(points.measurement).tolist(), rows_by(points.measurement), strict=True):
-        own = points.measurement == number
-        far = rows[int(np.argmax(np.linalg.norm(points.xyz[rows] - points.xyz[rows[0]], axis=1)))]
-        travel = points.xyz[far] - points.xyz[rows[0]]
-        length = float(np.linalg.norm(travel))
-        if length < _SAME_MM:
-            refuse(
-                points,
-                own,
-                where,
-                f"measurement {number} stands still: all its positions are one",
-                "Give the position of every reading as x_mm, y_mm, z_mm",
-            )
-        far = np.ptp(points.xyz[rows], axis=0) / np.ptp(points.machine.travel_mm, axis=1)
-        refuse(
-            points,
-            own & bool(far.max() > _BEYOND),
-            where,
-            f"measurement {number} goes {far.max():.3g} times the travel of {AXES[int(far.argmax())].upper()}",
-            "Give positions in mm, or mend travel_mm in [machine]",
-        )
-        travel = travel / length
-        travel = travel * np.sign(travel[int(np.argmax(np.abs(travel)))])
-        turns = bool(np.any(turn[rows]))
-        senses = turn[rows] if turns else read[rows]
-        if not turns and not np.any(senses):
-            senses = np.tile(travel, (len(rows), 1))
-        both = own & np.any(turn != 0, axis=1) & np.any(read != 0, axis=1)
-        refuse(
-            points,
-            both,
-            where,
-            "has both read_x … and turn_x …: a reading is one of them",
-            "Put 0 into the three that are not read",
-        )
-        if not turns and np.ptp(senses, axis=0).max() > _SAME_MM and (circle := _circle(points, number, rows, senses)):
-            found.append(circle)
-            continue
-        sense, other = senses[0], np.zeros(len(points), dtype=bool)
-        other[rows] = np.abs(senses - sense).max(axis=1) > _SAME_MM
-        refuse(
-            points,
-            other,
-            where,
-            f"measurement {number} reads along several directions, which are no radii of a circle",
-            "Number each quantity as a measurement of its own; on a circle give read_x … outward at each target",
-        )
-        if abs(np.linalg.norm(sense) - 1) > _UNIT:
-            refuse(points, own, where, "what is read has no unit length", "Give read_x … or turn_x … as a unit vector")
-        sense = sense / np.linalg.norm(sense)
-        cosine = abs(float(sense @ travel))
-        kind = TURNING if turns else ALONG if cosine > _ALONG else ACROSS
-        if kind == ACROSS and cosine > _ACROSS:
-            refuse(
-                points,
-                own,
-                where,
-                f"measurement {number} reads neither along its travel nor across it",
-                "Mend read_x, read_y, read_z, or the positions",
-            )
-        along = points.xyz[rows] @ travel
-        start = float(points.columns[START][rows[0]]) if START in points.columns else float(along.min())
-        positions = points.columns[TARGET][rows] if TARGET in points.columns else along - start
-        targets = np.unique(np.round(positions / _SAME_MM))
-        if kind == ACROSS and len(targets) < 3:
-            refuse(
-                points,
-                own,
-                where,
-                f"measurement {number} has {len(targets)} positions: a straightness needs three",
-                "Record more positions, or leave it out",
-            )
-        directions = np.sign(np.round(vectors(points, APPROACHES)[rows] @ travel, 9))
-        found.append(Run(number, kind, rows, travel, sense, start, positions, directions))
-    return tuple(found)
+    turns = bool(np.any(turn[rows]))
+    senses = turn[rows] if turns else read[rows]
+    if not np.any(senses):
+        senses = np.tile(travel, (len(rows), 1))
+    both = "has both read_x … and turn_x …: a reading is one of them"
+    check(np.any(turn != 0, axis=1) & np.any(read != 0, axis=1), both, "Put 0 into the three that are not read")
+    if not turns and np.ptp(senses, axis=0).max() > _SAME_MM and (circle := _circle(points, number, rows, senses)):
+        return circle
+    sense, other = senses[0], np.zeros(len(points), dtype=bool)
+    other[rows] = np.abs(senses - sense).max(axis=1) > _SAME_MM
+    check(
+        other,
+        f"{whose} reads along several directions, which are no radii of a circle",
+        "Number each quantity as a measurement of its own; on a circle give read_x … outward at each target",
+    )
+    no_unit = bool(abs(np.linalg.norm(sense) - 1) > _UNIT)
+    check(no_unit, "what is read has no unit length", "Give read_x … or turn_x … as a unit vector")
+    sense = sense / np.linalg.norm(sense)
+    cosine = abs(float(sense @ travel))
+    kind = TURNING if turns else ALONG if cosine > _ALONG else ACROSS
+    slanting = f"{whose} reads neither along its travel nor across it"
+    check(kind == ACROSS and cosine > _ACROSS, slanting, "Mend read_x, read_y, read_z, or the positions")
+    along, known = xyz @ travel, points.columns
+    start = float(known[START][rows[0]]) if START in known else float(along.min())
+    positions = known[TARGET][rows] if TARGET in known else along - start
+    targets = len(np.unique(np.round(positions / _SAME_MM)))
+    few = f"{whose} has {targets} positions: a straightness needs three"
+    check(kind == ACROSS and targets < 3, few, "Record more positions, or leave it out")
+    directions = np.sign(np.round(vectors(points, APPROACHES)[rows] @ travel, 9))
+    return Run(number, kind, rows, travel, sense, start, positions, directions)

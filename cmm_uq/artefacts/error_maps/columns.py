@@ -42,9 +42,8 @@ def copies(values: Floats, unit: float) -> list[tuple[int, ...]]:
     for k in np.flatnonzero(values.any(axis=1)).tolist():
         group = next((group for group in groups if any(_same(values[j], values[k], unit) for j in group)), None)
         if group is None:
-            groups.append([k])
-        else:
-            group.append(k)
+            groups.append(group := [])
+        group.append(k)
     return [tuple(group) for group in groups if len(group) > 1]
 
 
@@ -93,7 +92,7 @@ _ROUNDS = 5
 # part of the readings of a map that may be spikes; with more, what is left of the column is not believed
 DAMAGED = 0.25
 
-_FINEST = 0.3  # part of the last digit that no reading is better than
+_FINEST = 0.3  # part of the last digit that the standard deviation of no reading is below
 
 
 def spikes(positions: Floats, values: Floats, unit: float) -> NDArray[np.bool_]:
@@ -104,7 +103,11 @@ def spikes(positions: Floats, values: Floats, unit: float) -> NDArray[np.bool_]:
     found, left = np.zeros(values.shape, dtype=bool), values.copy()
     if values.shape[1] < _FEWEST_of_spikes:
         return found
-    beside, finest = (_Beside.of(positions, SIDE), _Beside.of(positions, NEAR)), _finest(values, unit)
+    beside, steps = (
+        (_Beside.of(positions, SIDE), _Beside.of(positions, NEAR)),
+        np.diff(np.unique(np.round(values / unit, 6))),
+    )
+    finest = _FINEST * float(steps.min()) * unit if len(steps) else 0.0
     for _ in range(_ROUNDS):
         off, new = _round(beside, left, finest)
         new &= ~found
@@ -137,12 +140,6 @@ def _round(beside: tuple[_Beside, _Beside], values: Floats, finest: float) -> tu
         apart = np.abs(courses - off)
         return off, shown & (apart + _OWN * np.abs(off) < apart[::-1])
     return off, shown & (np.abs(off) >= np.abs(off).max(axis=0))
-
-
-def _finest(values: Floats, unit: float) -> float:
-    """Least standard deviation of a reading that its digits allow, mm."""
-    steps = np.diff(np.unique(np.round(values / unit, 6)))
-    return _FINEST * float(steps.min()) * unit if len(steps) else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,9 +186,8 @@ class _Beside:
 def _median(values: Floats, there: NDArray[np.bool_]) -> Floats:
     """Of those of each row (p, n) that are there; 0 where none is."""
     ordered, count = np.sort(np.where(there, values, np.inf), axis=1), there.sum(axis=1)
-    low, high = (
-        np.take_along_axis(ordered, i[:, None], axis=1)[:, 0] for i in (np.maximum(count - 1, 0) // 2, count // 2)
-    )
+    middle = np.column_stack([np.maximum(count - 1, 0) // 2, count // 2])
+    low, high = np.take_along_axis(ordered, middle, axis=1).T
     return np.where(count > 0, 0.5 * (low + high), 0.0)
 
 
@@ -241,11 +237,10 @@ class MapColumn:
     @property
     def unit(self) -> tuple[Unit, float]:
         """Unit as printed, and its size in ``values``."""
-        return (unit("µm"), MICROMETRE) if self.component < 3 else (unit("″"), ARCSECOND * METRE)
+        return unit("µm" if self.component < 3 else "″"), _size(self.component)
 
 
 def title_of(axis: str, component: int) -> Text:
-    """An error of a carriage in words."""
     carriage, along = Verbatim(axis.upper()), Verbatim(AXES[component % 3].upper())
     if component >= 3:
         return say("rotation of {axis} about {along}", axis=carriage, along=along)
@@ -267,7 +262,7 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
     for axis, carriage in enumerate(AXES):
         shared = reduce(lambda one, other: one[np.isin(one, other)], (m.axes[axis].positions for m in maps))
         for component in range(6):
-            title, size = title_of(carriage, component), MICROMETRE if component < 3 else ARCSECOND * METRE
+            title, size = title_of(carriage, component), _size(component)
             values = _values(maps, axis, component, shared)
             copied, measured = copies(values, size), np.flatnonzero(values.any(axis=1)).tolist()
             for group in copied:
@@ -278,15 +273,20 @@ def columns_of(maps: Sequence[ErrorMap]) -> tuple[list[MapColumn], list[Finding]
             if len(own) >= 2 and len(shared) >= LEAST_POSITIONS:
                 column, odd = _looked_at([maps[k] for k in own], values[own], axis, component, shared)
                 columns += [] if column is None else [column]
-                findings += odd
-                findings += [] if column is None else _unmoved(column)
+                findings += [*odd, *([] if column is None else _unmoved(column))]
         if (count := len(shared)) < LEAST_POSITIONS:
             why = say(
                 "the maps share {count} positions of axis {carriage}: they are not compared. Map the same positions",
-                count=count, carriage=Verbatim(carriage),
-            )  # fmt: skip
+                count=count,
+                carriage=Verbatim(carriage),
+            )
             findings.append(Finding("positions", (), (), why))
     return columns, [*_alike(same, unmeasured), *findings]
+
+
+def _size(component: int) -> float:
+    """Of a column's unit, mm; of rotations at a lever of one metre."""
+    return MICROMETRE if component < 3 else ARCSECOND * METRE
 
 
 def _values(maps: Sequence[ErrorMap], axis: int, component: int, shared: Floats) -> Floats:
@@ -300,14 +300,25 @@ def _looked_at(
     maps: Sequence[ErrorMap], values: Floats, axis: int, component: int, shared: Floats
 ) -> tuple[MapColumn | None, list[Finding]]:
     """What of an error can be compared, ``None`` where too little is left, and what is odd."""
-    title, size = title_of(AXES[axis], component), MICROMETRE if component < 3 else ARCSECOND * METRE
+    title, size, findings = title_of(AXES[axis], component), _size(component), list[Finding]()
     found = spikes(shared, values, size)
     damaged = found.mean(axis=1) > DAMAGED
-    findings = [_damaged(title, maps[k]) for k in np.flatnonzero(damaged).tolist()]
-    findings += [
-        _stray(title, shared[i], maps[k], values[k, i] / size, COLUMNS[component])
-        for k, i in zip(*np.nonzero(found & ~damaged[:, None]), strict=True)
-    ]
+    for k in np.flatnonzero(damaged).tolist():
+        why = say(
+            "the {title} jumps in more than a quarter of its readings in the map at {temperature:g} °C; that map's is left "
+            "out. Measure it again",
+            title=title,
+            temperature=maps[k].temperature,
+        )
+        findings.append(Finding("outlier", (), (), why, set_aside=True))
+    for k, i in zip(*np.nonzero(found & ~damaged[:, None]), strict=True):
+        why = say(
+            "the {title} at {position} mm in the map at {temperature:g} °C, {value}, jumps off its neighbours and off the "
+            "other maps; the position is left out. Measure it again",
+            title=title, position=signed(shared[i], "g"), temperature=maps[k].temperature,
+            value=signed(values[k, i] / size, ".4g"),
+        )  # fmt: skip
+        findings.append(Finding("outlier", (), (), why, column=COLUMNS[component], set_aside=True))
     kept, left = ~found[~damaged].any(axis=0), np.flatnonzero(~damaged).tolist()
     if len(left) < 2 or kept.sum() < LEAST_POSITIONS:
         return None, findings
@@ -332,43 +343,19 @@ def roughness(column: MapColumn) -> float:
 def _unmoved(column: MapColumn) -> Iterator[Finding]:
     """Two maps of a scale that agree where by their temperatures, and by what a third map shows, they should not."""
     values, warm = column.values, column.temperatures
-    for pair in combinations(range(len(values)), 2) if column.is_scale else ():
-        agree, apart = float(np.abs(np.diff(values[list(pair)], axis=0)).max()), abs(warm[pair[0]] - warm[pair[1]])
-        for third in sorted(set(range(len(values))) - set(pair)):
-            far = min(float(np.abs(values[k] - values[third]).max()) for k in pair)
-            gap = max(abs(warm[k] - warm[third]) for k in pair)
+    for i, j in combinations(range(len(values)), 2) if column.is_scale else ():
+        agree, apart = float(np.abs(values[j] - values[i]).max()), abs(warm[i] - warm[j])
+        for third in sorted(set(range(len(values))) - {i, j}):
+            far = min(float(np.abs(values[k] - values[third]).max()) for k in (i, j))
+            gap = max(abs(warm[k] - warm[third]) for k in (i, j))
             if apart and agree * max(1.0, gap / apart) * _UNMOVED < far:
                 why = say(
                     "{title}: the maps at {one:g} and {other:g} °C agree to {agree:.2g} µm where that at {third:g} °C is "
                     "{far:.2g} µm off, more than their temperatures explain. One may be a copy of another; say when and how "
-                    "warm each was taken",
-                    title=column.title,
-                    one=warm[pair[0]],
-                    other=warm[pair[1]],
-                    third=warm[third],
-                    agree=agree / MICROMETRE,
-                    far=far / MICROMETRE,
-                )
+                    "warm each was taken", title=column.title, one=warm[i], other=warm[j], third=warm[third],
+                    agree=agree / MICROMETRE, far=far / MICROMETRE,
+                )  # fmt: skip
                 yield Finding("copied", (), (), why)
-
-
-def _stray(title: Text, position: float, error_map: ErrorMap, value: float, column: str) -> Finding:
-    why = say(
-        "the {title} at {position} mm in the map at {temperature:g} °C, {value}, jumps off its neighbours and off the "
-        "other maps; the position is left out. Measure it again",
-        title=title, position=signed(position, "g"), temperature=error_map.temperature, value=signed(value, ".4g"),
-    )  # fmt: skip
-    return Finding("outlier", (), (), why, column=column, set_aside=True)
-
-
-def _damaged(title: Text, error_map: ErrorMap) -> Finding:
-    why = say(
-        "the {title} jumps in more than a quarter of its readings in the map at {temperature:g} °C; that map's is left out. "
-        "Measure it again",
-        title=title,
-        temperature=error_map.temperature,
-    )
-    return Finding("outlier", (), (), why, set_aside=True)
 
 
 def _alike(same: dict[tuple[float, ...], list[Text]], unmeasured: list[Text]) -> Iterator[Finding]:
@@ -376,8 +363,9 @@ def _alike(same: dict[tuple[float, ...], list[Text]], unmeasured: list[Text]) ->
         why = say(
             "{titles}: the maps at {temperatures} °C give the same figures. They were measured once, and say "
             "nothing of how the maps differ; measure them at each temperature",
-            titles=listed(titles), temperatures=commas(number(t, "g") for t in temperatures),
-        )  # fmt: skip
+            titles=listed(titles),
+            temperatures=commas(number(t, "g") for t in temperatures),
+        )
         yield Finding("copied", (), (), why, set_aside=True)
     if unmeasured:
         why = say("{titles}: zero in every map, so they were not measured", titles=listed(unmeasured))

@@ -124,11 +124,12 @@ class ColumnComparison:
         noises = kinds_along(np.repeat(np.arange(m // p), p), _WHITE, _CORRELATIONS)
         explanations = [
             Explanation(
-                rival.name, EFFECT if rival.effect else UNKNOWN,
+                rival.name,
+                EFFECT if rival.effect else UNKNOWN,
                 tuple(Member(self.seen(rival.over_maps, f), values=f) for f in rival.functions),
             )
             for rival in self.rivals
-        ]  # fmt: skip
+        ]
         # no heavy tails in what is drawn: p-values are corrected for all columns, and few draws do not tell that far a tail
         return CandidateComparison(
             self.observed, self.baseline, [*noises, heavy_tails(left)], sigma, np.full(_SIGMAS, -np.log(_SIGMAS)),
@@ -154,14 +155,12 @@ class ColumnComparison:
 
     @cached_property
     def effect(self) -> int | None:
-        """Which of the rivals is a probable effect."""
         return next(
             (i for i, rival in enumerate(self.rivals) if rival.effect and self.combinations.of(i) >= _ASSERTED), None
         )
 
     @cached_property
     def unknown(self) -> tuple[int, ...]:
-        """Rivals in the most probable combination that are no effect."""
         return tuple(sorted(i for i in self.best if not self.rivals[i].effect))
 
     def instead(self, least: float) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.analysis.screening.columns import Finding
@@ -18,7 +19,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
-from cmm_uq.certificate.document import Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Section, figure_columns, section, table
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.predicted_errors import WHERE, maps_of
 from cmm_uq.machine.physics.catalogue import effects as effects_named
@@ -34,8 +35,6 @@ _NAMED = 0.05  # probability from which another explanation is named
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """How the maps of one error differ beyond any known effect."""
-
     column: MapColumn  # the error
     rival: CandidateCause  # the explanation in words, with the map that differs if one does
     probability: float  # of it
@@ -75,28 +74,31 @@ class MapsDiagnosis:
         return min(1.0, len(self.comparisons) * compared.p_value)
 
 
+Modelled = tuple[ColumnComparison, tuple[Version, ...]]  # a column, and what of its comparison is asserted
+
+
 def diagnose_maps(
     columns: Sequence[MapColumn], named: Sequence[str], *, alpha: float, seed: int, progress: Progress | None = None
 ) -> MapsDiagnosis:
-    comparisons, effects, differences = [], [], []
+    modelled, effects, differences, p_values = list[Modelled](), [], [], [1.0]
     for i, column in enumerate(columns):
         compared = comparison.column_comparison(column, named, seed)
-        comparisons.append(compared)
         p_value = len(columns) * compared.p_value
+        p_values.append(p_value)
+        modelled.append((compared, compared.versions if p_value < alpha else ()))
         if p_value < alpha:
             if found := expansion_shown(compared):
                 effects.append(found)
             differences += [_difference(compared, index, p_value) for index in compared.unknown]
         if progress:
             progress((i + 1) / len(columns))
-    p_value = min([1.0, *(len(comparisons) * compared.p_value for compared in comparisons)])
-    verdict = "consistent" if p_value >= alpha else "unexplained" if not effects else "explained"
+    verdict = "consistent" if min(p_values) >= alpha else "unexplained" if not effects else "explained"
     if verdict == "explained" and differences:
         verdict = "partial"
     return MapsDiagnosis(
-        verdict, p_value, alpha, tuple(comparisons), tuple(sorted(effects, key=lambda e: -e.probability)),
-        tuple(sorted(differences, key=lambda d: -d.amplitude_um)), _noise(comparisons, alpha, rotations=False),
-        _noise(comparisons, alpha, rotations=True), _improvement(comparisons, alpha),
+        verdict, min(p_values), alpha, tuple(compared for compared, _ in modelled),
+        tuple(sorted(effects, key=lambda e: -e.probability)), tuple(sorted(differences, key=lambda d: -d.amplitude_um)),
+        _noise(modelled, rotations=False), _noise(modelled, rotations=True), _improvement(modelled),
     )  # fmt: skip
 
 
@@ -140,38 +142,30 @@ def _difference(compared: ColumnComparison, index: int, p_value: float) -> Diffe
     )  # fmt: skip
 
 
-def _improvement(comparisons: Sequence[ColumnComparison], alpha: float) -> Improvement:
+def _improvement(modelled: Sequence[Modelled]) -> Improvement:
     rms: list[list[Floats]] = [[], [], [], []]
     gains = [np.zeros(0)]
-    for compared in comparisons:
-        versions = compared.versions if len(comparisons) * compared.p_value < alpha else ()
+    for compared, versions in modelled:
         early, late = comparison.held_out(compared, ()), comparison.held_out(compared, versions)
-        for place, values in zip(
-            rms,
-            (comparison.residual(compared, ()), comparison.residual(compared, versions), early[0], late[0]),
-            strict=True,
-        ):
+        left = (comparison.residual(compared, some) for some in ((), versions))
+        for place, values in zip(rms, (*left, early[0], late[0]), strict=True):
             place.append(values)
         gains.append(late[1] - early[1])
     gain = np.concatenate(gains)
-    left, modelled, before_um, after_um = (
+    before, after, early_um, late_um = (
         float(np.sqrt(np.mean(np.concatenate(v) ** 2))) / MICROMETRE if v else 0.0 for v in rms
     )
     se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
-    return Improvement(left, modelled, before_um, after_um, float(gain.sum()), se, say("parts of the travel"))
+    return Improvement(before, after, early_um, late_um, float(gain.sum()), se, say("parts of the travel"))
 
 
-def _noise(comparisons: Sequence[ColumnComparison], alpha: float, *, rotations: bool) -> Quantity | None:
+def _noise(modelled: Sequence[Modelled], *, rotations: bool) -> Quantity | None:
     """Root mean square, over the columns, of the noise of a reading once everything found is modelled."""
-    chosen = [compared for compared in comparisons if (compared.column.component >= 3) == rotations]
+    chosen = [each for each in modelled if (each[0].column.component >= 3) == rotations]
     if not chosen:
         return None
-    unit, factor = chosen[0].column.unit
-    found = [
-        comparison.noise_of(compared, compared.versions if len(comparisons) * compared.p_value < alpha else ())
-        for compared in chosen
-    ]
-    variances, freedoms = np.array(found).T
+    unit, factor = chosen[0][0].column.unit
+    variances, freedoms = np.array([comparison.noise_of(*each) for each in chosen]).T
     value = float(np.sqrt(variances.mean())) / factor
     u = value * float(np.sqrt(np.sum(variances**2 / (2 * freedoms)))) / float(variances.sum())
     return Quantity(value, u, (max(value - 1.96 * u, 0.0), value + 1.96 * u), unit)
@@ -225,15 +219,14 @@ def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
     same: dict[tuple[float, ...], list[float]] = {}
     for m in _stated(maps):
         same.setdefault(tuple(m.squareness.tolist()), []).append(m.temperature)
-    found = []
-    for each in (commas(number(t, "g") for t in some) for some in same.values() if len(some) > 1):
-        why = say(
+    return [
+        Finding("copied", (), (), say(
             "squareness: the maps at {temperatures} °C give the same figures. They were measured once, and say "
             "nothing of how it changes; measure it at each temperature",
-            temperatures=each,
-        )
-        found.append(Finding("copied", (), (), why))
-    return found
+            temperatures=commas(number(t, "g") for t in some),
+        ))
+        for some in same.values() if len(some) > 1
+    ]  # fmt: skip
 
 
 def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
@@ -245,13 +238,12 @@ def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
         for m, row in zip(ordered, figures, strict=True)
     ]
     rows.append((say("Largest less smallest"), *(number(value, ".5g") for value in np.ptp(figures, axis=0))))
-    pairs = (say("{pair} / ″", pair=Verbatim(pair)) for pair in ("XY", "YZ", "ZX"))
-    heads = (*text_columns(say("Map")), *figure_columns(*pairs))
+    pairs = figure_columns(*(say("{pair} / ″", pair=Verbatim(pair)) for pair in ("XY", "YZ", "ZX")))
     note = say(
         "There is one figure a map, without an uncertainty: whether they differ is not tested. One "
         "arc second moves a point by 2.4 µm over 500 mm."
     )
-    return (Section(say("Squareness of the axes"), (Table(say("Squareness"), heads, tuple(rows), (note,)),)),)
+    return (section(say("Squareness of the axes"), table(say("Squareness"), [say("Map"), *pairs], rows, note)),)
 
 
 def _stated(maps: Sequence[ErrorMap]) -> list[ErrorMap]:

@@ -31,30 +31,28 @@ VERDICTS: Mapping[str, tuple[Text, Text]] = {
     ),
     "partial": (
         say("Partly explained: a cause is found, and maps differ besides"),
-        say(
-            "The maps differ from each other; something that makes them differ is found, but it does not account for all."
-        ),
+        say("The maps differ from each other; something that makes them differ is found, but it does not account for all."),
     ),
     "unexplained": (
         say("Unexplained: maps differ, and no known effect accounts for it"),
         say("The maps differ from each other, and no known effect accounts for it."),
     ),
-}
+}  # fmt: skip
 
 
 def difference_words(difference: Difference) -> Text:
-    rival = difference.rival
-    low, high = difference.region
+    rival, column = difference.rival, difference.column
+    low, high = (signed(end, "g") for end in difference.region)
     size = say(
         "by up to {amplitude:.2g}\u00a0{unit}, most of all from {axis} = {low} to {high}\u00a0mm",
-        amplitude=difference.amplitude, unit=difference.column.unit[0], axis=Verbatim(difference.column.axis.upper()),
-        low=signed(low, "g"), high=signed(high, "g"),
+        amplitude=difference.amplitude, unit=column.unit[0], axis=Verbatim(column.axis.upper()), low=low, high=high,
     )  # fmt: skip
     what, chance = rival.name, probability(difference.probability)
     if rival.map is not None:
-        text = say("{what:capital} differs from the others {size} (probability {chance}).",
-                   what=what, size=size, chance=chance)  # fmt: skip
-    elif len(difference.column.temperatures) == 2:
+        text = say(
+            "{what:capital} differs from the others {size} (probability {chance}).", what=what, size=size, chance=chance
+        )
+    elif len(column.temperatures) == 2:
         text = say("{what:capital}: {size}; which of the two is right they cannot say (probability {chance}).",
                    what=what, size=size, chance=chance)  # fmt: skip
     else:
@@ -84,14 +82,11 @@ def next_words(d: MapsDiagnosis) -> list[tuple[tuple[Text, ...], Text]]:
         some = [difference for difference in d.differences if difference.column.title == title]
         names = tuple(dict.fromkeys(name for one in some for name in (one.rival.name, *one.instead)))
         temperatures = some[0].column.temperatures
-        if len(temperatures) == 2:
-            what = say("Map the {title} a third time: with two maps nothing says which of them is off.", title=title)
-        else:
+        what = say("Map the {title} a third time: with two maps nothing says which of them is off.", title=title)
+        if len(temperatures) != 2:
             chosen = [t for k, t in enumerate(temperatures) if any(k in one.maps for one in some)]
-            shown = [number(t, "g") for t in (chosen if len(chosen) == 1 else temperatures)]
-            what = say(
-                "Measure the {title} again at {temperatures} °C.", title=title, temperatures=messages.listed(shown)
-            )
+            shown = messages.listed([number(t, "g") for t in (chosen if len(chosen) == 1 else temperatures)])
+            what = say("Measure the {title} again at {temperatures} °C.", title=title, temperatures=shown)
         found.append((names, what))
     return found
 
@@ -123,20 +118,16 @@ def _found(d: MapsDiagnosis) -> Text:
         say("{title}: {size}.", title=item.title, size=size_of(effect_of(item.effect), item.parameters, factors=False))
         for item in d.effects
     ]
-    said += [_difference(difference) for difference in d.differences[:_SHOWN]]
+    said += [
+        say("{what:capital}: off by up to {amplitude:.2g}\u00a0{unit}.",
+            what=item.rival.name, amplitude=item.amplitude, unit=item.column.unit[0])
+        for item in d.differences[:_SHOWN]
+    ]  # fmt: skip
     if (more := len(d.differences) - _SHOWN) > 0:
-        said.append(plural(
-            more, one=say("One more difference is told below."),
-            many=say("{more} more differences are told below.", more=more),
-        ))  # fmt: skip
+        one = say("One more difference is told below.")
+        many = say("{more} more differences are told below.", more=more)
+        said.append(plural(more, one=one, many=many))
     return messages.lines(said)
-
-
-def _difference(item: Difference) -> Text:
-    return say(
-        "{what:capital}: off by up to {amplitude:.2g}\u00a0{unit}.",
-        what=item.rival.name, amplitude=item.amplitude, unit=item.column.unit[0],
-    )  # fmt: skip
 
 
 def _where(d: MapsDiagnosis) -> Text:
@@ -150,23 +141,19 @@ def _where(d: MapsDiagnosis) -> Text:
 
 def _sure(d: MapsDiagnosis) -> Text:
     said: list[Text] = [say("Noise alone looks like this in {share} sets of maps.", share=share_of(d.p_value))]
-    if d.effects:
-        each = semicolons(
-            say("{what} {probability}", what=one.title, probability=probability(one.probability)) for one in d.effects
-        )
-        said.append(say("Probability: {each}.", each=each))
-        said.append(gained(d.improvement))
+    each = [say("{what} {probability}", what=one.title, probability=probability(one.probability)) for one in d.effects]
+    if each:
+        said += [say("Probability: {each}.", each=semicolons(each)), gained(d.improvement)]
     return messages.lines(said)
 
 
 def _to_do(found: MapsDiagnosed) -> Text:
     d = found.diagnosis
     said: list[Text] = [
-        say("{what:capital}.", what=what) for what in dict.fromkeys(item.points_to for item in d.effects)
+        say("{what:capital}.", what=each) for each in dict.fromkeys(item.points_to for item in d.effects)
     ]
     said += [what for _, what in next_words(d)[:_SHOWN]]
-    if found.findings:
-        said.append(say("See the warnings on the maps."))
+    said += [say("See the warnings on the maps.")] if found.findings else []
     return messages.lines(said) if said else say("Nothing on account of these maps.")
 
 
@@ -179,7 +166,14 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
         "sampling": {"sampler": None, "seed": seed, "ess_min": None, "rhat_max": None, "converged": True},
         "diagnosis": {
             "verdict": d.verdict, "p_value": d.p_value, **false_alarms(d.alpha),
-            "where": [_where_data(item) for item in d.differences],
+            "where": [
+                {
+                    "covariate": f"{item.column.axis}_mm", "region": list(item.region), "p_value": min(1.0, item.p_value),
+                    "amplitude_um": item.amplitude_um, "what": item.rival.name, "probability": item.probability,
+                    "instead": list(item.instead), "sign_turned": item.turned,
+                }
+                for item in d.differences
+            ],
             "effects": [effect_data(item, d.improvement) for item in d.effects],
             "indistinguishable": [],
             "suggested_measurements": [
@@ -199,25 +193,15 @@ def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _where_data(item: Difference) -> dict[str, Any]:
-    return {
-        "covariate": f"{item.column.axis}_mm", "region": list(item.region), "p_value": min(1.0, item.p_value),
-        "amplitude_um": item.amplitude_um, "what": item.rival.name, "probability": item.probability,
-        "instead": list(item.instead), "sign_turned": item.turned,
-    }  # fmt: skip
-
-
 def _compared(compared: ColumnComparison, p_value: float) -> dict[str, Any]:
+    column, ordered = compared.column, sorted(compared.combinations.probability.items(), key=lambda item: -item[1])
     return {
-        "what": compared.column.title,
-        "positions": len(compared.column.positions),
-        "temperatures_c": compared.column.temperatures.tolist(),
+        "what": column.title, "positions": len(column.positions), "temperatures_c": column.temperatures.tolist(),
         "p_value": p_value,
         "explanations": [
-            {"together": [compared.rivals[i].name for i in key], "probability": p}
-            for key, p in sorted(compared.combinations.probability.items(), key=lambda item: -item[1])[:6]
+            {"together": [compared.rivals[i].name for i in key], "probability": p} for key, p in ordered[:6]
         ],
-    }
+    }  # fmt: skip
 
 
 _PICTURES = 3
@@ -229,13 +213,20 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
         say("{file}, {temperature_c:g} °C", file=Verbatim(given.file), temperature_c=given.temperature_c)
         for given in facts.machine.error_map
     )
+    note = say(
+        "A fifth of the travel at a time is predicted from the rest. Rotations count at a lever of "
+        "one metre; ± is one standard error."
+    )
+    rms = say("Rms of how the maps differ"), say("Rms on held-out parts of the travel")
     sections = (
         Section(say("What makes the maps differ"), _told(found)),
-        Section(say("What to measure next"), tuple(Paragraph(what) for _, what in next_words(d))),
-        Section(say("Before and after"), () if d.verdict == "consistent" else (_before_after(found),)),
+        parts.section(say("What to measure next"), *(Paragraph(what) for _, what in next_words(d))),
+        parts.section(
+            say("Before and after"), None if d.verdict == "consistent" else improvement_table(d.improvement, *rms, note)
+        ),
         *diagnosis.squareness_sections(found.maps),
-        Section(say("Noise"), tuple(Paragraph(text) for text in noise_words(d))),
-        Section(say("Errors compared"), (_compared_of_page(found),)),
+        parts.section(say("Noise"), *(Paragraph(text) for text in noise_words(d))),
+        parts.section(say("Errors compared"), _compared_of_page(found)),
     )
     tested = (
         (say("Machine"), Verbatim(facts.machine.name)),
@@ -285,32 +276,19 @@ def _picture(difference: Difference) -> Block:
     )  # fmt: skip
 
 
-def _before_after(found: MapsDiagnosed) -> Table:
-    note = say(
-        "A fifth of the travel at a time is predicted from the rest. Rotations count at a lever of "
-        "one metre; ± is one standard error."
-    )
-    return improvement_table(
-        found.diagnosis.improvement, say("Rms of how the maps differ"), say("Rms on held-out parts of the travel"), note
-    )
-
-
-def _compared_of_page(found: MapsDiagnosed) -> Table:
-    d = found.diagnosis
-    rows = []
+def _compared_of_page(found: MapsDiagnosed) -> Table | None:
+    d, rows = found.diagnosis, []
     for one in d.comparisons:
         counts = number(len(one.column.values)), number(len(one.column.positions))
-        best = messages.commas([one.rivals[i].short for i in sorted(one.best)]) or say("noise")
+        short = messages.commas([one.rivals[i].short for i in sorted(one.best)]) or say("noise")
         chance = probability(one.combinations.probability[one.best])
-        rows.append((one.column.title, *counts, number(d.p_of(one), ".2g"), best, chance))
-    heads = (
-        *parts.text_columns(say("Error")), *parts.figure_columns(say("Maps"), say("Positions"), say("p")),
-        *parts.text_columns(say("Most probable explanation")), Column(say("Probability")),
-    )  # fmt: skip
+        rows.append((one.column.title, *counts, number(d.p_of(one), ".2g"), short, chance))
+    figures = parts.figure_columns(say("Maps"), say("Positions"), say("p"))
+    best = say("Most probable explanation")
     note = say(
         "p is corrected for having looked at all of them. Each error is a free function of position that the maps share."
     )
-    return Table(say("What was compared"), heads, tuple(rows), (note,))
+    return parts.table(say("What was compared"), [say("Error"), *figures, best, Column(say("Probability"))], rows, note)
 
 
 def outcome(found: MapsDiagnosed, seed: int) -> Outcome:

@@ -140,7 +140,6 @@ class Multilateration(Artefact):
         return replace(points, xyz=points.xyz - (off / distance)[:, None] * away, machine=machine, columns=columns)
 
     def _first(self, points: Points, readings: Floats) -> list[Floats]:
-        """About where stations stand."""
         found, more = [], "Read more of them, spread over all three axes, or leave the station out"
         for number, rows in zip(self.stations.numbers, self.stations.rows, strict=True):
             own, count = points.measurement == number, len(np.unique(np.round(points.xyz[rows] / _SAME_MM), axis=0))

@@ -20,7 +20,7 @@ from cmm_uq.artefacts.multilateration.artefact import Multilateration
 from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import METRE, MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.plots.residuals import readings_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.machine.model import RecordingModel
@@ -125,8 +125,6 @@ def _motions(xyz: Floats, *, scale: bool) -> Floats:
 
 
 class Standpoint(NamedTuple):
-    """A station as found."""
-
     measurement: int
     readings: int
     position: Floats  # (3,) in the recording's frame, mm
@@ -163,7 +161,6 @@ def standpoints(
 
 
 def _free(result: Result) -> list[Text]:
-    """What is free, and no error of the machine."""
     artefact = cast("Multilateration", result.artefact)
     q, facts = len(artefact.stations.numbers), cast("MultilaterationFacts", result.job.facts.artefact)
     where = say(
@@ -201,80 +198,71 @@ def results(result: Result) -> dict[str, Any]:
 def sections(result: Result) -> list[Section]:
     data = results(result)
     free = Paragraph(say("Free, and no error of the machine: {free}.", free=semicolons(_free(result))))
-    table = _stations(data["stations"], result.noise.coverage_factor)
-    stations = (table, free, _readings(result), residual_volume(result, say("targets")))
-    alone = Section(say("Targets by the distances alone"), (_targets(data["targets"]),))
-    return [Section(say("Stations of the interferometer"), stations), alone]
+    stations = _stations(data["stations"], result.noise.coverage_factor)
+    volume = residual_volume(result, say("targets"))
+    return [
+        section(say("Stations of the interferometer"), stations, free, _readings(result), volume),
+        section(say("Targets by the distances alone"), _targets(data["targets"])),
+    ]
 
 
-def _stations(stations: list[dict[str, Any]], k: float) -> Table:
+def _stations(stations: list[dict[str, Any]], k: float) -> Table | None:
     rows, drifts = [], []
     for one in stations:
-        expanded = [*one["U_position_um"], one["U_dead_path_um"]]
+        which, expanded = number(one["measurement"]), [*one["U_position_um"], one["U_dead_path_um"]]
         figures = zip((*one["position_mm"], one["dead_path_mm"]), expanded, strict=True)
         x, y, z, path = (rounded(value, MICROMETRE * U)[0] for value, U in figures)
         of_place, of_path = (rounded(0.0, U)[1] for U in (max(expanded[:3]), expanded[3]))
         last = number(one["readings"]), number(one["residual_rms_um"], ".2f")
-        rows.append((number(one["measurement"]), x, y, z, of_place, path, of_path, *last))
+        rows.append((which, x, y, z, of_place, path, of_path, *last))
         if "drift_um_per_h" in one:
-            drift, of_drift = rounded(one["drift_um_per_h"], one["U_drift_um_per_h"])
-            which = number(one["measurement"])
-            drifts.append(
-                say(
-                    "Measurement {which}: the dead path drifts by {drift} ± {U} µm/h.",
-                    which=which,
-                    drift=drift,
-                    U=of_drift,
-                )
+            drift, U = rounded(one["drift_um_per_h"], one["U_drift_um_per_h"])
+            words = say(
+                "Measurement {which}: the dead path drifts by {drift} ± {U} µm/h.", which=which, drift=drift, U=U
             )
-    wide, dead = Column(Verbatim("U"), unit("µm")), Column(say("Dead path"), unit("mm"))
-    place = figure_columns(*map(Verbatim, "XYZ"), unit=unit("mm"))
-    heads = [*text_columns(say("Measurement")), *place, wide, dead, wide, *figure_columns(say("Readings"))]
+            drifts.append(words)
     note = say(
         "U (k = {k}): of the coordinate that is known least, and of the dead path; of the readings' noise and of the error "
         "factors. Positions are in the frame of the recording.",
         k=number(k, ".2f"),
     )
-    heads.append(Column(say("Residual (rms)"), unit("µm")))
-    return Table(say("Stations"), tuple(heads), tuple(rows), (note, *drifts))
+    wide, dead = Column(Verbatim("U"), unit("µm")), Column(say("Dead path"), unit("mm"))
+    return table(
+        say("Stations"),
+        [say("Measurement"), *figure_columns(*map(Verbatim, "XYZ"), unit=unit("mm")), wide, dead, wide,
+         Column(say("Readings")), Column(say("Residual (rms)"), unit("µm"))], rows, note, *drifts,
+    )  # fmt: skip
 
 
 def _readings(result: Result) -> Block:
     artefact = cast("Multilateration", result.artefact)
     away = artefact.points.xyz - artefact.found[artefact.stations.index, :3]
-    return readings_plot(
-        result,
-        (np.linalg.norm(away, axis=1) - artefact.distances) / MICROMETRE,
-        reference=say("distance from the best station"),
-        from_reference=say("from the best station"),
-        caption=say(
-            "Distances of indicated targets from the best place of their station less what was read, as recorded and after "
-            "the fitted model, with U (k = {k}).",
-            k=number(result.noise.coverage_factor, ".2f"),
-        ),
+    caption = say(
+        "Distances of indicated targets from the best place of their station less what was read, as recorded and after "
+        "the fitted model, with U (k = {k}).",
+        k=number(result.noise.coverage_factor, ".2f"),
     )
+    off = (np.linalg.norm(away, axis=1) - artefact.distances) / MICROMETRE
+    reference = say("distance from the best station")
+    return readings_plot(result, off, reference=reference, from_reference=say("from the best station"), caption=caption)
 
 
-def _targets(targets: dict[str, Any]) -> Block:
+def _targets(targets: dict[str, Any]) -> Block | None:
     if "not_found" in targets:
         return Paragraph(say("Not found: {why}", why=targets["not_found"]), tone="note")
     names, rows = ("error_um", "left_um", "U_um"), []
     for i, axis in enumerate(AXES):
         rms = [float(np.sqrt(np.mean([one[name][i] ** 2 for one in targets["each"]]))) for name in names]
         rows.append((Verbatim(axis.upper()), *(number(value, ".2f") for value in rms)))
-    heads = figure_columns(say("Errors"), say("Left by the fitted model"), say("U"), unit=unit("µm"))
+    figures = figure_columns(say("Errors"), say("Left by the fitted model"), say("U"), unit=unit("µm"))
     note = say(
         "{count} targets, each read from {stations} stations or more, by distances alone, as if nothing were known of the "
         "machine; root mean squares. What moves all targets together is no error here. Residuals of {freedom} degrees of "
         "freedom have a standard deviation of {sd} µm. U (k = {k}) of one target, of white noise.",
-        count=len(targets["each"]),
-        stations=STATIONS,
-        freedom=targets["degrees_of_freedom"],
-        k=number(targets["k"], ".2f"),
-        sd=number(targets["residual_sd_um"], ".2f"),
-    )
-    title = say("Errors of the targets along each axis")
-    return Table(title, (*text_columns(say("Axis")), *heads), tuple(rows), (note,))
+        count=len(targets["each"]), stations=STATIONS, freedom=targets["degrees_of_freedom"],
+        k=number(targets["k"], ".2f"), sd=number(targets["residual_sd_um"], ".2f"),
+    )  # fmt: skip
+    return table(say("Errors of the targets along each axis"), [say("Axis"), *figures], rows, note)
 
 
 PAGE = Page(sections, results)

@@ -21,12 +21,12 @@ from cmm_uq.analysis.screening import shape
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts import ballbar
 from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, SCAN, THREE, scan, scan_misfit, scan_of
+from cmm_uq.artefacts.digitizer import ANGLES, SCAN, THREE, offset_sizes, scan, scan_misfit, scan_of
 from cmm_uq.artefacts.digitizer_page import OffsetFigures
 from cmm_uq.artefacts.kinds import BallbarFacts
 from cmm_uq.artefacts.optical.balls import BALL, FEWEST, ScannedBall, ball_table, balls_of, carried, scanned_ball
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Section
@@ -95,11 +95,7 @@ class ScannedBallbar(Ballbar):
         lengths = self.lengths()
         length, sd = length_of(facts, float(lengths.mean()), "the scanned bars", where)
         dimension = Size("length_mm", say("Length of the bar"), unit("mm"), length, sd, say("length"))
-        sought = (
-            Size(f"{name}_mm", Verbatim(name), unit("mm"), float(value), np.inf, role="sought")
-            for name, value in zip(OFFSET, self._offset, strict=True)
-        )
-        self.sizes = (dimension, *(sought if self._tells_offset(where) else ()))
+        self.sizes = (dimension, *(offset_sizes(self._offset) if self._tells_offset(where) else ()))
 
     def ends(self) -> Floats:
         return self._centre.reshape(-1, 2, 3)

@@ -90,7 +90,6 @@ def carried(points: Points, offset: Floats) -> Floats:
 
 
 def scanned_ball(points: Points, offset: Floats, form_um: float, where: str | None) -> ScannedBall:
-    """From the points of one ball."""
     numbers = int(points.measurement[0]), int(points.repeat[0]), int(points.columns[BALL][0])
     whose, here = f"measurement {numbers[0]}, ball {numbers[2]}", place(points, np.ones(len(points), dtype=bool), where)
     angles = columns_needed(points, ANGLES, "digitizer", where)

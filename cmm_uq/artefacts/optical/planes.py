@@ -18,7 +18,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Column, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Column, Section, figure_columns, section, table
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import expanded
@@ -123,15 +123,10 @@ def _title(letter: str, number: int) -> Text:
 
 
 def results(result: Result) -> dict[str, Any]:
-    planes = cast("ScannedPlanes", result.artefact)
-    found = [
-        {
-            "pose": i,
-            **{name: quantity_data(result.sizes[f"{name}_{i}"]) for name in ANGLES},
-            "indexed_deg": each.tolist(),
-        }
-        for i, each in enumerate(planes.indexed, 1)
-    ]
+    found = []
+    for i, each in enumerate(cast("ScannedPlanes", result.artefact).indexed, 1):
+        angles = {name: quantity_data(result.sizes[f"{name}_{i}"]) for name in ANGLES}
+        found.append({"pose": i, **angles, "indexed_deg": each.tolist()})
     return {"attitudes": found}
 
 
@@ -139,12 +134,15 @@ def sections(result: Result) -> list[Section]:
     planes, rows = cast("ScannedPlanes", result.artefact), []
     for i, each in enumerate(planes.indexed, 1):
         for name, letter, indexed in zip(ANGLES, _LETTERS, each.tolist(), strict=True):
-            value, U, k = expanded(result.sizes[f"{name}_{i}"])
-            rows.append((number(i), Verbatim(letter), signed(indexed, "g"), value, U, k))
+            rows.append((number(i), Verbatim(letter), signed(indexed, "g"), *expanded(result.sizes[f"{name}_{i}"])))
     figures = figure_columns(say("As indexed"), say("Estimate"), say("U"), unit=unit("°"))
-    columns = (Column(say("Attitude")), *text_columns(say("Angle")), *figures, Column(say("k")))
     note = say("Euler angles 3-1-3 of the digitizer's axes u, v, w in those of the machine (Harris 2004 eq. 7).")
-    return [Section(say("Attitudes"), (Table(say("Euler angles"), columns, tuple(rows), (note,)),))]
+    return [
+        section(
+            say("Attitudes"),
+            table(say("Euler angles"), (Column(say("Attitude")), say("Angle"), *figures, Column(say("k"))), rows, note),
+        )
+    ]
 
 
 PAGE = Page(sections, results)
@@ -174,9 +172,6 @@ _OF_SCANS = cast("Beginning", DIGITIZER.begin)
 BEGIN = Beginning(
     title="Attitude of a laser digitizer from three scanned planes",
     numbering="One measurement is one plane in one attitude; its points are scanned points.",
-    artefact={"name": "Planes"},
-    effects=(),
-    noise_um=5.0,
-    points=scans,
+    artefact={"name": "Planes"}, effects=(), noise_um=5.0, points=scans,
     columns={**_OF_SCANS.columns, **_OF_SCANS.further},
-)
+)  # fmt: skip

@@ -21,7 +21,7 @@ from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, D
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Section, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Block, Column, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
@@ -75,8 +75,6 @@ SCREENING = Screening(shape_of)
 
 @dataclass(frozen=True, eq=False)
 class PredictedPoses:
-    """Points held out of the fit in turn, as the others predict them."""
-
     rows: Ints  # (n,) of the recording, those of which all coordinates are used
     off: Floats  # (n,) distance from where they were seen, mm
     within: Floats  # (n, 3) coordinates within U of their prediction, as 0 or 1
@@ -125,16 +123,15 @@ def results(result: Result) -> dict[str, Any]:
     """For results.json: distances, how points held out were predicted, and the rows of an arm as found."""
     predicted, found = predicted_poses(result.model), dict[str, Any](_distances(result))
     if predicted is not None:
-        shares = {
-            "coordinates_within_U": float(predicted.within.mean()),
-            "points_within_ellipsoid": float(predicted.inside.mean()),
-        }
-        found["held_out"] = {**_figures(predicted.off), **shares, "points": len(predicted.off)}
+        shares = (float(inside.mean()) for inside in (predicted.within, predicted.inside))
+        shown = dict(zip(_SHARES, shares, strict=True))
+        found["held_out"] = {**_figures(predicted.off), **shown, "points": len(predicted.off)}
     machine = result.artefact.points.machine
     rows = {"rows": rows_of(result, machine)} if isinstance(machine, Arm) else {}
     return {"positions": found, **rows}
 
 
+_SHARES = ("coordinates_within_U", "points_within_ellipsoid")
 _KEYS = {A: "a_mm", ALPHA: "alpha_deg", D: "d_mm", THETA: "theta_deg", BETA: "beta_deg"}
 _TO_ROWS: Mapping[int, float] = {i: MICROMETRE if i in (A, D) else 1 / 3600 for i in range(5)}
 
@@ -153,64 +150,52 @@ def rows_of(result: Result, arm: Arm) -> list[dict[str, float]]:
 
 def sections(result: Result) -> list[Section]:
     data = results(result)
-    blocks: list[Block] = [_table(data["positions"], result), _arrows(result)]
-    if "rows" in data:
-        blocks.append(_rows(data["rows"], result))
-    return [Section(say("Positions of the tool"), tuple(blocks))]
+    rows = _rows(data["rows"], result) if "rows" in data else None
+    return [section(say("Positions of the tool"), _table(data["positions"], result), _arrows(result), rows)]
 
 
 _WHEN: Mapping[str, Text] = {
-    "before": say("as recorded, placed"),
-    "after": say("after the fitted model"),
-    "held_out": say("held out, predicted"),
-}
+    "before": say("as recorded, placed"), "after": say("after the fitted model"), "held_out": say("held out, predicted"),
+}  # fmt: skip
 
 
-def _table(found: dict[str, Any], result: Result) -> Table:
-    noise = result.noise.coordinate.value
-    rows, notes = [], list[Text]()
+def _table(found: dict[str, Any], result: Result) -> Table | None:
+    noise, rows, notes = result.noise.coordinate.value, [], list[Text]()
     for when, words in _WHEN.items():
-        if when not in found:
+        if (one := found.get(when)) is None:
             continue
-        one = found[when]
         figures = (rounded(one[name], noise)[0] for name in ("mean_um", "rms_um", "largest_um"))
-        shares = [
-            number(100 * one[name], ".1f") if name in one else NOTHING
-            for name in ("coordinates_within_U", "points_within_ellipsoid")
-        ]
+        shares = [number(100 * one[name], ".1f") if name in one else NOTHING for name in _SHARES]
         rows.append((words, *figures, *shares))
     if "held_out" in found:
-        notes.append(
-            say(
-                "Held out: {count} points, each predicted from those at other poses; how many coordinates lie "
-                "within U (95 %), and how many points within the 95 % ellipsoid of all three.",
-                count=found["held_out"]["points"],
-            )
+        held_out = say(
+            "Held out: {count} points, each predicted from those at other poses; how many coordinates lie "
+            "within U (95 %), and how many points within the 95 % ellipsoid of all three.",
+            count=found["held_out"]["points"],
         )
-    notes.append(
-        say(
-            "This is a calibration. Pose accuracy and repeatability (ISO 9283) need poses that were commanded and repeated.",
-        )
+        notes.append(held_out)
+    iso = say(
+        "This is a calibration. Pose accuracy and repeatability (ISO 9283) need poses that were commanded and repeated."
     )
     distances = figure_columns(say("Mean"), say("rms"), say("Largest"), unit=unit("µm"))
     within = figure_columns(say("Coordinates within U"), say("Points within the ellipsoid"), unit=unit("%"))
     title = say("Distance from where the reference instrument saw the point")
-    return Table(title, (*text_columns(say("Points")), *distances, *within), tuple(rows), tuple(notes))
+    return table(title, [say("Points"), *distances, *within], rows, *notes, iso)
 
 
-def _rows(rows: list[dict[str, float]], result: Result) -> Table:
-    heads = (
-        *figure_columns(Verbatim("a"), unit=unit("mm")),
-        *figure_columns(Verbatim("α"), unit=unit("°")),
-        *figure_columns(Verbatim("d"), unit=unit("mm")),
-        *figure_columns(Verbatim("θ"), Verbatim("β"), unit=unit("°")),
-    )
-    each = tuple(
+def _rows(rows: list[dict[str, float]], result: Result) -> Table | None:
+    figures = (("a", "mm"), ("α", "°"), ("d", "mm"), ("θ", "°"), ("β", "°"))
+    each = (
         (Verbatim(joint.upper()), *(signed(row[_KEYS[i]], ".4f" if i in (A, D) else ".5f") for i in range(5)))
         for joint, row in zip(cast("Arm", result.artefact.points.machine).joints, rows, strict=True)
     )
     note = say("What the recording leaves open stands as the job has it.")
-    return Table(say("Rows of the arm as found"), (*text_columns(say("Joint")), *heads), each, (note,))
+    return table(
+        say("Rows of the arm as found"),
+        (say("Joint"), *(Column(Verbatim(name), unit(of)) for name, of in figures)),
+        each,
+        note,
+    )
 
 
 def _arrows(result: Result) -> Block:
@@ -222,16 +207,13 @@ def _arrows(result: Result) -> Block:
     before, after = alike(*(float(np.linalg.norm(each, axis=1).max()) for each in arrows))
     first, second = (Verbatim(AXES[axis].upper()) for axis in axes)
     return vector_plot(
-        xyz[:, axes],
-        tuple(zip((_WHEN["before"], _WHEN["after"]), arrows, strict=True)),
+        xyz[:, axes], tuple(zip((_WHEN["before"], _WHEN["after"]), arrows, strict=True)),
         axis_labels=(say("{axis} / mm", axis=first), say("{axis} / mm", axis=second)),
         caption=say("Indicated less seen places, in the plane of {first} and {second}.", first=first, second=second),
         alternative=say(
-            "Arrows of up to {before} µm as recorded, up to {after} µm after the fitted model.",
-            before=before,
-            after=after,
+            "Arrows of up to {before} µm as recorded, up to {after} µm after the fitted model.", before=before, after=after
         ),
-    )
+    )  # fmt: skip
 
 
 PAGE = Page(sections, results)
@@ -264,26 +246,17 @@ _ROBOT_ROWS = (  # a, α, d, θ, travel of a robot of six joints that reaches 1.
 )
 # without what a place says nothing of: the base, rows of parallel axes, and the last joint beside the tool
 _DETERMINED = (
-    *(f"zero_q{i}" for i in range(2, 6)),
-    *(f"length_q{i}" for i in range(1, 6)),
-    *(f"twist_q{i}" for i in range(1, 6)),
-    *(f"offset_q{i}" for i in range(3, 6)),
-    "parallelism_q2",
-    "tool_offset",
-)
+    *(f"zero_q{i}" for i in range(2, 6)), *(f"length_q{i}" for i in range(1, 6)), *(f"twist_q{i}" for i in range(1, 6)),
+    *(f"offset_q{i}" for i in range(3, 6)), "parallelism_q2", "tool_offset",
+)  # fmt: skip
 BEGIN = Beginning(
     title="Robot measured by a laser tracker",
     numbering="One measurement is one station of the tracker; its points are the poses.",
-    artefact={"name": "Laser tracker", "u_um": "10 + 5·L/1000"},
-    noise_um=40.0,
-    effects=_DETERMINED,
-    points=poses,
+    artefact={"name": "Laser tracker", "u_um": "10 + 5·L/1000"}, noise_um=40.0, effects=_DETERMINED, points=poses,
     machine={
-        "name": "Robot",
-        "arm": {"tool_mm": [30.0, 0.0, 120.0]},
+        "name": "Robot", "arm": {"tool_mm": [30.0, 0.0, 120.0]},
         "joint": [
-            {"a_mm": a, "alpha_deg": alpha, "d_mm": d, "theta_deg": theta, "travel": travel}
-            for a, alpha, d, theta, travel in _ROBOT_ROWS
+            dict(zip(("a_mm", "alpha_deg", "d_mm", "theta_deg", "travel"), row, strict=True)) for row in _ROBOT_ROWS
         ],
     },
     columns={
@@ -291,4 +264,4 @@ BEGIN = Beginning(
         **{f"q{i}_deg": f"Reading of joint {i}." for i in range(1, 7)},
     },
     further={f"approach_q{i}": f"Sense in which joint {i} moved last: −1, 0 or +1." for i in range(1, 7)},
-)
+)  # fmt: skip

@@ -23,7 +23,7 @@ from cmm_uq.artefacts.shift import axis_page, plane_page
 from cmm_uq.artefacts.shift.axis import ShiftResult, analyse_shift, checked_series, known_points, recorded_series
 from cmm_uq.artefacts.shift.placed_plate import placed_plate, rotations
 from cmm_uq.artefacts.shift.plane import PlaneShiftResult, analyse_plane, checked_plate
-from cmm_uq.artefacts.shift.result import shift_facts, table_file, table_text
+from cmm_uq.artefacts.shift.result import shift_facts, table_file
 from cmm_uq.artefacts.shift.series import undetermined
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, day, names, say
@@ -39,6 +39,7 @@ from cmm_uq.certificate.sections.results import as_found_data, as_found_section,
 from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.artefact import Artefact, Size
+from cmm_uq.machine.physics.error_map import error_map_csv
 from cmm_uq.maths.inference.ensembles import Progress
 
 _ROUNDS = 8
@@ -50,6 +51,7 @@ class ShiftedArtefact(Artefact):
     kind = "shift"
     title = say("Uncalibrated artefact, shifted")
     curves = True
+    _known: tuple[int, int] | None = None
 
     def __init__(self, facts: ShiftFacts, points: Points, *, where: str | None = None) -> None:
         self.points, file = points, where or "recording"
@@ -60,8 +62,7 @@ class ShiftedArtefact(Artefact):
         self._start: tuple[Floats, Floats, Floats]
         if facts.plane is not None:
             plate = placed_plate(points, facts.plane, file)
-            self._axes, free = plate.axes, True
-            self._start = plate.balls, plate.moved, plate.turned
+            self._axes, free, self._start = plate.axes, True, (plate.balls, plate.moved, plate.turned)
         else:
             series = recorded_series(facts, points, file)
             self._axes, free = (AXES.index(series.axis),), series.u_shift > 0
@@ -70,13 +71,11 @@ class ShiftedArtefact(Artefact):
         self._free = np.arange(1, len(placings)) if free else np.zeros(0, dtype=np.int64)
         self.rows = np.repeat(np.arange(n), d)[:, None]
         self.noise_scale = np.repeat(points.columns.get("noise_ratio", np.ones(n)), d)
-        self._known = None
         self._start = self._laid(points.carriages, None)
-        if facts.known is not None:
-            self._known = known_points(facts.known, numbers)
-            title = say("Known length")
-            sd = facts.known.u_um * MICROMETRE
-            self.sizes = (Size("known_mm", title, unit("mm"), facts.known.length_mm, sd, say("length")),)
+        if (known := facts.known) is not None:
+            self._known = known_points(known, numbers)
+            title, sd = say("Known length"), known.u_um * MICROMETRE
+            self.sizes = (Size("known_mm", title, unit("mm"), known.length_mm, sd, say("length")),)
 
     @property
     def set_up(self) -> Text:
@@ -93,8 +92,8 @@ class ShiftedArtefact(Artefact):
         return np.asarray(displacement[:, self._axes].reshape(len(self.rows), -1))
 
     def size_change(self) -> Floats:
-        tied = self._columns(*self._start)
-        return tied @ np.linalg.pinv(self._tie(self._start[0], tied.shape[1]))[:, : len(self.sizes)]
+        columns = self._columns(*self._start)
+        return columns @ np.linalg.pinv(self._tie(self._start[0], columns.shape[1]))[:, : len(self.sizes)]
 
     def placing(self, xyz: Floats) -> Floats:
         columns = self._columns(*self._start)
@@ -123,15 +122,16 @@ class ShiftedArtefact(Artefact):
                 turned[self._free] += change[:, d]
         return body, moved, turned
 
+    def _turn(self, turned: Floats) -> Floats:
+        """(n, d, d) of the artefact's axes at each reading."""
+        return (rotations(turned) if self._turns else turned[:, None, None])[self._placing]
+
     def _predicted(self, body: Floats, moved: Floats, turned: Floats) -> Floats:
-        turn = rotations(turned) if self._turns else turned[:, None, None]
-        return np.asarray(moved[self._placing] + np.einsum("nij,nj->ni", turn[self._placing], body[self._point]))
+        return np.asarray(moved[self._placing] + np.einsum("nij,nj->ni", self._turn(turned), body[self._point]))
 
     def _columns(self, body: Floats, moved: Floats, turned: Floats) -> Floats:
         """(n·d, q) change of the readings for the dimensions, then for place and turn of each placing that is free."""
-        (p, d), n = body.shape, len(self.points)
-        turn = (rotations(turned) if self._turns else turned[:, None, None])[self._placing]
-        each = d + self._turns
+        (p, d), n, turn, each = body.shape, len(self.points), self._turn(turned), body.shape[1] + self._turns
         found, rows = np.zeros((n, d, p * d + each * len(self._free))), np.arange(n)
         for k in range(d):
             found[rows, :, d * self._point + k] = turn[:, :, k]
@@ -157,9 +157,7 @@ class ShiftedArtefact(Artefact):
     @staticmethod
     def _untied(tie: Floats) -> Floats:
         """(q, r) changes that leave the known length as it is."""
-        if not len(tie):
-            return np.eye(tie.shape[1])
-        return np.asarray(np.linalg.svd(tie)[2][1:].T)
+        return np.asarray(np.linalg.svd(tie)[2][1:].T) if len(tie) else np.eye(tie.shape[1])
 
 
 def refuse_unfit(job: Job) -> None:
@@ -185,29 +183,22 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
                 "What is stated of the artefact's temperature, expansion, alignment and fixturing is in no figure here."
             )
         )
-    warned = (*told, *formal_warnings(job))
+    warned, measured = (*told, *formal_warnings(job)), day(job.facts.job.date)
     figures = tuple(figure_row(name, quantity) for _, _, name, quantity in left)
-    short = Summary(
-        page.measured(found),
-        day(job.facts.job.date),
-        headlines(found),
-        figures,
-        warnings=warned,
-    )
+    short = Summary(page.measured(found), measured, headlines(found), figures, warnings=warned)
     draws, table = posterior_file(found.draws, job.origin), table_file(job)
     results = page.shift_results(found) | as_found_data(job) | clauses_data(job) | found.stating.data()
     results["posterior"] = draws.entry
-    files = {table: table_text(found.table), draws.name: draws.content}
+    files = {table: error_map_csv(found.table).encode(), draws.name: draws.content}
 
     def certificate() -> Document:
-        sections = page.sections(found)
-        sections[1:1] = [conformity_section(found.statements), as_found_section(job, left)]
+        first, *others = page.sections(found)
+        sections = [first, conformity_section(found.statements), as_found_section(job, left), *others]
+        sampler, version = Verbatim(found.estimate.chains.sampler), Verbatim(__version__)
         produced_by = say(
-            "cmm-uq {version}, {sampler}, seed {seed}",
-            version=Verbatim(__version__), sampler=Verbatim(found.estimate.chains.sampler), seed=found.estimate.seed,
-        )  # fmt: skip
-        overview = overview_of(found)
-        return certificate_of(job, sections, tuple(told), produced_by, tuple(names(files)), overview)
+            "cmm-uq {version}, {sampler}, seed {seed}", version=version, sampler=sampler, seed=found.estimate.seed
+        )
+        return certificate_of(job, sections, tuple(told), produced_by, tuple(names(files)), overview_of(found))
 
     return Outcome(found, certificate, results, short, warned, files, draws=found.draws, verdicts=found.verdicts)
 
@@ -226,21 +217,15 @@ def shift_series(setting: Setting) -> tuple[SetUp, ...]:
         raise CmmUqError("the length of the artefact is needed", where="job.toml [plan] length_mm",
                          fix="Give it, with pitch_mm, or all distances as lengths_mm")  # fmt: skip
     places = np.concatenate([[0.0], faces_of(facts, plan.model_copy(update={"length_mm": known}))])
-    i = AXES.index(facts.axis)
-    reach = float(places[-1] + np.ptp(facts.shifts_mm))
+    i, start = AXES.index(facts.axis), volume.box.mean(axis=1)
+    along, reach = np.eye(3)[i], float(places[-1] + np.ptp(facts.shifts_mm))
     if reach > volume.size[i]:
-        raise volume.too_small(np.outer([0.0, reach], np.eye(3)[i]), say("with its farthest shift"))
-    start = volume.box.mean(axis=1)
+        raise volume.too_small(np.outer([0.0, reach], along), say("with its farthest shift"))
     start[i] = volume.box[i, 0] - min(facts.shifts_mm)
-    n = len(places)
-    body = np.outer(places, np.eye(3)[i])
-    pattern = Pattern(body, np.arange(1, n + 1), np.ones(n, dtype=np.int64)).repeated(plan.repeats)
-    return tuple(
-        pattern.placed(
-            setting.machine, np.eye(3), start + shift * np.eye(3)[i], say("shifted by {shift:g} mm", shift=shift)
-        )
-        for shift in facts.shifts_mm
-    )
+    numbers = np.arange(1, len(places) + 1)
+    pattern = Pattern(np.outer(places, along), numbers, np.ones_like(numbers)).repeated(plan.repeats)
+    titles = [(shift, say("shifted by {shift:g} mm", shift=shift)) for shift in facts.shifts_mm]
+    return tuple(pattern.placed(setting.machine, np.eye(3), start + shift * along, words) for shift, words in titles)
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
@@ -250,23 +235,17 @@ def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
 
 
 def free(setting: Setting, points: Points, where: str) -> tuple[Text, ...]:
-    """What no reading of these series shows."""
     facts = _facts(setting)
     left = undetermined(recorded_series(facts, points, where), scale_known=facts.known is not None)
-    found = [
-        say(
-            "errors that repeat every {period:.4g} mm, or a half, a third … of it: every shift is a multiple of it",
-            period=left.period,
-        )
-    ]
+    found: list[Text] = [
+        say("errors that repeat every {period:.4g} mm, or a half, a third … of it: every shift is a multiple of it",
+            period=left.period)
+    ]  # fmt: skip
     if facts.known is None:
         found.append(say("the mean scale of the axis: no length of the artefact is known"))
-    if left.patterns.shape[1]:
+    if (shape := left.patterns.shape[1]) > 0:
         found.append(
-            say(
-                "{shape} independent patterns of error at the places read, unless errors are smooth",
-                shape=left.patterns.shape[1],
-            )
+            say("{shape} independent patterns of error at the places read, unless errors are smooth", shape=shape)
         )
     return tuple(found)
 

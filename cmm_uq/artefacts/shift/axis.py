@@ -7,6 +7,7 @@ The artefact's dimensions X and the slope are free; D is known, or known within 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,7 +16,6 @@ import numpy as np
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts.kinds import KnownLength, ShiftFacts
 from cmm_uq.artefacts.shift import result as shared
-from cmm_uq.artefacts.shift.decisions import OF_AN_AXIS, decided, figure_of, refuse_undecidable
 from cmm_uq.artefacts.shift.integration import IntegratedCurve, KnownSpan, Method, integrated
 from cmm_uq.artefacts.shift.result import Curve, Reported, ShiftFound
 from cmm_uq.artefacts.shift.series import RepeatedDrift, ShiftedSeries, Undetermined, shifted_series, undetermined
@@ -36,8 +36,6 @@ _DRIFT = 10 * MICROMETRE  # standard deviation of the drift, mm per hour
 
 @dataclass(frozen=True, eq=False)
 class CurveEstimate(shared.Estimated):
-    """All that the readings say of an axis."""
-
     series: ShiftedSeries  # series, known: what it was made from
     known: KnownSpan | None
     scale_known: bool  # whether the mean sensitivity is determined: by a known length, or by shifts known exactly
@@ -104,13 +102,9 @@ class CurveEstimate(shared.Estimated):
 
 
 def estimate_curve(
-    series: ShiftedSeries,
-    known: KnownSpan | None = None,
-    *,
-    sigma: float | None = None,
-    seed: int = 0,
+    series: ShiftedSeries, known: KnownSpan | None = None, *, sigma: float | None = None, seed: int = 0,
     progress: Progress | None = None,
-) -> CurveEstimate:
+) -> CurveEstimate:  # fmt: skip
     """Fit all readings at once.
 
     ``sigma`` standard uncertainty of one reading, mm; from repeats and residuals when left out.
@@ -259,9 +253,8 @@ class ShiftResult(ShiftFound):
     @cached_property
     def statements(self) -> tuple[Statement, ...]:
         found = [(self.linearity, MICROMETRE, NOTHING)]
-        return decided(
-            self.job, {OF_AN_AXIS: figure_of(self.job.points, found, [float(np.ptp(self.estimate.series.span))])}
-        )
+        figure = shared.figure_of(self.job.points, found, [float(np.ptp(self.estimate.series.span))])
+        return shared.decided(self.job, {shared.OF_AN_AXIS: figure})
 
     @cached_property
     def reported(self) -> Reported:
@@ -315,7 +308,13 @@ def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
     check_facts(job)
     facts = shared.shift_facts(job)
     series = recorded_series(facts, job.points, job.recording_path)
-    return series, None if facts.known is None else _known(facts.known, series)
+    unshifted = series.reading - series.shifts[series.series]
+
+    def apart(first: int, last: int) -> float:
+        one, other = (float(np.mean(unshifted[series.point == i])) for i in (first, last))
+        return other - one
+
+    return series, None if facts.known is None else known_span(facts.known, series.numbers, apart)
 
 
 def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSeries:
@@ -323,8 +322,9 @@ def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSer
         raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
                          fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
     if not facts.shifts_mm:
-        raise CmmUqError("is missing", where="job.toml [artefact] shifts_mm",
-                         fix="Give one shift a series, 0.0 for the first")  # fmt: skip
+        raise CmmUqError(
+            "is missing", where="job.toml [artefact] shifts_mm", fix="Give one shift a series, 0.0 for the first"
+        )
     return shifted_series(
         points, facts.axis, np.array(facts.shifts_mm, dtype=np.float64), facts.sd_shift_um * MICROMETRE, where
     )
@@ -335,7 +335,7 @@ def check_facts(job: Job) -> None:
     if facts.model.effects:
         raise CmmUqError("a shift job estimates errors as free functions, not by effects",
                          where="job.toml [model] effects", fix="Write effects = []")  # fmt: skip
-    refuse_undecidable(job)
+    shared.refuse_undecidable(job)
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip
@@ -356,18 +356,13 @@ def known_points(given: KnownLength, numbers: Ints) -> tuple[int, int]:
     return index[given.from_point], index[given.to_point]
 
 
-def check_known(given: KnownLength, measured: float) -> None:
-    """Refuse a known length that the readings contradict grossly."""
-    if abs(measured - given.length_mm) > _MISREAD * given.length_mm:
-        raise CmmUqError(f"points {given.from_point} and {given.to_point} read {measured:.6g} mm apart, not "
+def known_span(given: KnownLength, numbers: Ints, apart: Callable[[int, int], float]) -> KnownSpan:
+    """A known length, along as ``apart`` measures it from point to point, mm; refused where that is grossly another."""
+    first, last = known_points(given, numbers)
+    measured = apart(first, last)
+    if abs(abs(measured) - given.length_mm) > _MISREAD * given.length_mm:
+        raise CmmUqError(f"points {given.from_point} and {given.to_point} read {abs(measured):.6g} mm apart, not "
                          f"{given.length_mm:g} mm", where=KNOWN, fix="Mend the length or the points")  # fmt: skip
-
-
-def _known(given: KnownLength, series: ShiftedSeries) -> KnownSpan:
-    first, last = known_points(given, series.numbers)
-    mean = [float(np.mean((series.reading - series.shifts[series.series])[series.point == i])) for i in (first, last)]
-    measured = mean[1] - mean[0]
-    check_known(given, abs(measured))
     return KnownSpan(first, last, float(np.copysign(given.length_mm, measured)), given.u_um * MICROMETRE)
 
 

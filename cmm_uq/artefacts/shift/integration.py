@@ -125,27 +125,18 @@ def integrated(
     true shift and its standard uncertainty, mm; from the readings when left out.
     """
     check_readings(a, b)
-    inputs, sd = _inputs(a, b, u, shift, u_shift, known)
-    stepped = inputs + 1j * _STEP * np.eye(len(inputs))
-    sensitivity = _error(stepped, len(a), method, shift, known).imag / _STEP
-    error = _error(inputs, len(a), method, shift, known)
-    scaled = sensitivity * sd[:, None]
-    return IntegratedCurve(a, error, scaled.T @ scaled)
-
-
-def _inputs(
-    a: Floats, b: Floats, u: Floats, shift: float | None, u_shift: float, known: KnownSpan | None
-) -> tuple[Floats, Floats]:
-    """Readings, shift and known length as one vector, and their standard uncertainties."""
     given = [] if shift is None else [(shift, u_shift)]
     given += [] if known is None else [(known.length, known.u)]
-    more = np.array(given, dtype=np.float64).reshape(-1, 2)
-    return np.concatenate([a, b, more[:, 0]]), np.concatenate([u[0], u[1], more[:, 1]])
+    further, sd = np.array(given, dtype=np.float64).reshape(-1, 2).T
+    inputs, n = np.concatenate([a, b, further]), len(a)
 
+    def error(of: Readings) -> Readings:
+        first, second = of[..., :n], of[..., n : 2 * n]
+        curve = calibration_curve(first, second, None if shift is None else of[..., 2 * n], method)
+        if known is not None:
+            curve = with_known_length(curve, known.first, known.last, of[..., -1])
+        return position_error(first, curve)
 
-def _error(inputs: Readings, n: int, method: Method, shift: float | None, known: KnownSpan | None) -> Readings:
-    a, b = inputs[..., :n], inputs[..., n : 2 * n]
-    curve = calibration_curve(a, b, None if shift is None else inputs[..., 2 * n], method)
-    if known is not None:
-        curve = with_known_length(curve, known.first, known.last, inputs[..., -1])
-    return position_error(a, curve)
+    sensitivity = error(inputs + 1j * _STEP * np.eye(len(inputs))).imag / _STEP
+    scaled = sensitivity * np.concatenate([*u, sd])[:, None]
+    return IntegratedCurve(a, error(inputs), scaled.T @ scaled)

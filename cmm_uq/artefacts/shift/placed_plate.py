@@ -193,24 +193,24 @@ def _check_balls(
         line = means.line[row]
         raise CmmUqError(
             f"ball {means.point[row]} of placing {means.measurement[row]} lies {away[row]:.3g} mm from where the other "
-            "placings have it", where=f"{where} line {line}" if line else where or None,
+            "placings have it",
+            where=f"{where} line {line}" if line else where or None,
             fix="Number the balls alike in every placing, do not turn the plate upside down, or read this placing again",
-        )  # fmt: skip
+        )
 
 
 def _check_placings(flat: Floats, placing: Ints, placings: Ints, turned: Floats, where: str) -> None:
-    middles = np.array([flat[placing == s].mean(axis=0) for s in range(len(placings))])
+    each = [flat[placing == s] for s in range(len(placings))]
     for a, b in combinations(range(len(placings)), 2):
         turn = np.angle(np.exp(1j * (turned[b] - turned[a])))
-        if np.linalg.norm(middles[b] - middles[a]) < _ALIKE_MM and abs(turn) < _ALIKE_RAD:
+        if np.linalg.norm(each[b].mean(axis=0) - each[a].mean(axis=0)) < _ALIKE_MM and abs(turn) < _ALIKE_RAD:
             raise CmmUqError(
                 f"placings {placings[a]} and {placings[b]} stand in the same place: they show nothing of the machine",
                 where=where or None,
                 fix=f"Shift placing {placings[b]} by about the pitch of the balls, or turn it by 90°; the same place read "
                 "again is a repeat",
             )
-    low = np.array([flat[placing == s].min(axis=0) for s in range(len(placings))])
-    high = np.array([flat[placing == s].max(axis=0) for s in range(len(placings))])
+    low, high = (np.array([end(balls, axis=0) for balls in each]) for end in (np.min, np.max))
     for s, number in enumerate(placings):
         others = np.arange(len(placings)) != s
         if not np.any(np.all((low[others] < high[s]) & (high[others] > low[s]), axis=1)):

@@ -13,10 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.artefacts.kinds import KnownLength
 from cmm_uq.artefacts.shift import result as shared
-from cmm_uq.artefacts.shift.axis import check_facts, check_known, known_points
-from cmm_uq.artefacts.shift.decisions import decided, figure_of
+from cmm_uq.artefacts.shift.axis import check_facts, known_span
 from cmm_uq.artefacts.shift.integration import KnownSpan
 from cmm_uq.artefacts.shift.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.artefacts.shift.plane_model import FreeInPlane, PlaneModel, free_in_plane, plane_model, title
@@ -45,10 +43,9 @@ class PlaneEstimate(shared.Estimated):
     free: FreeInPlane  # what the placings leave open
 
     @cached_property
-    def positions(self) -> tuple[Floats, Floats]:
+    def positions(self) -> tuple[Floats, ...]:
         """Evenly spaced readings of each axis over what was read, mm."""
-        i, j = (np.linspace(*self.plate.span(axis), _FINE) for axis in self.plate.axes)
-        return i, j
+        return tuple(np.linspace(*self.plate.span(axis), _FINE) for axis in self.plate.axes)
 
     def _on(self, index: int) -> tuple[Floats, Floats, int]:
         """Positions and draws (N, m) of one function, and which of the two axes it belongs to."""
@@ -61,10 +58,9 @@ class PlaneEstimate(shared.Estimated):
         return np.asarray((values[:, -1] - values[:, 0]) / (x[-1] - x[0]))
 
     @cached_property
-    def scales(self) -> tuple[Floats, Floats]:
+    def scales(self) -> tuple[Floats, ...]:
         """(N,) draws of the error of each axis over what was read, from end to end, along its own motion."""
-        i, j = (np.asarray(np.linalg.norm(motion, axis=0) - 1) for motion in self._motions)
-        return i, j
+        return tuple(np.asarray(np.linalg.norm(motion, axis=0) - 1) for motion in self._motions)
 
     @cached_property
     def squareness(self) -> Floats:
@@ -87,28 +83,26 @@ class PlaneEstimate(shared.Estimated):
         return np.asarray(c)
 
     @cached_property
-    def linearity(self) -> tuple[Curve, Curve]:
+    def linearity(self) -> tuple[Curve, ...]:
         """Of each axis, zero at its lowest reading; at its highest too where its scale is not determined."""
-        i, j = (self._linearity(k) for k in range(2))
-        return i, j
-
-    def _linearity(self, which: int) -> Curve:
-        x, values, _ = self._on(which)
-        values = values + self.coefficients.columns[:, which : which + 1] * (x - x[0])
-        values -= values[:, :1]
-        if SCALE[AXES[self.plate.axes[which]]].name in self.free.names:
-            values -= (values[:, -1:] / (x[-1] - x[0])) * (x - x[0])
-        return Curve(x, values)
+        found = []
+        for which, axis in enumerate(self.plate.axes):
+            x, values, _ = self._on(which)
+            values = values + self.coefficients.columns[:, which : which + 1] * (x - x[0])
+            values -= values[:, :1]
+            if SCALE[AXES[axis]].name in self.free.names:
+                values -= (values[:, -1:] / (x[-1] - x[0])) * (x - x[0])
+            found.append(Curve(x, values))
+        return tuple(found)
 
     @cached_property
-    def straightness(self) -> tuple[Curve, Curve]:
+    def straightness(self) -> tuple[Curve, ...]:
         """Of the first axis along the second, and the reverse."""
-        i, j = (self._straightness(k) for k in (2, 3))
-        return i, j
-
-    def _straightness(self, index: int) -> Curve:
-        x, values, _ = self._on(index)
-        return Curve(x, values - values[:, :1] - self._slope(index)[:, None] * (x - x[0]))
+        found = []
+        for index in (2, 3):
+            x, values, _ = self._on(index)
+            found.append(Curve(x, values - values[:, :1] - self._slope(index)[:, None] * (x - x[0])))
+        return tuple(found)
 
     @cached_property
     def rotations(self) -> dict[int, Curve]:
@@ -137,7 +131,7 @@ class PlaneEstimate(shared.Estimated):
             np.sum(middle * centred, axis=(1, 2)),
         )
         size = np.ones(len(places))
-        if not self.free.size_known:
+        if not self.free.determines(SCALE):
             size = np.linalg.norm(middle) / np.linalg.norm(centred, axis=(1, 2))
         laid = size[:, None] * np.exp(-1j * turn)[:, None] * (centred[..., 0] + 1j * centred[..., 1])
         laid -= laid[:, 0].mean()
@@ -151,14 +145,9 @@ class PlaneEstimate(shared.Estimated):
 
 
 def estimate_plane(
-    plate: PlacedPlate,
-    known: KnownSpan | None = None,
-    *,
-    chain: str = "XYZ",
-    sigma: float | None = None,
-    seed: int = 0,
+    plate: PlacedPlate, known: KnownSpan | None = None, *, chain: str = "XYZ", sigma: float | None = None, seed: int = 0,
     progress: Progress | None = None,
-) -> PlaneEstimate:
+) -> PlaneEstimate:  # fmt: skip
     """Fit all placings at once.
 
     ``sigma`` standard uncertainty of one coordinate of one reading, mm; from repeats and residuals when left out.
@@ -189,8 +178,6 @@ class PrintedCurve(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlaneShiftResult(ShiftFound):
-    """All that is known of a plate's placings after their analysis."""
-
     estimate: PlaneEstimate
 
     @property
@@ -231,11 +218,13 @@ class PlaneShiftResult(ShiftFound):
         for figure, names in (("linearity", list(self.curves)[:2]), ("straightness", list(self.curves)[2:])):
             known = [i for i, name in enumerate(names) if PEAK_TO_VALLEY in self.scalars.get(name, {})]
             each = [(self.scalars[names[i]][PEAK_TO_VALLEY], MICROMETRE, title(names[i])) for i in known]
-            found[figure] = figure_of(self.job.points, each, [spans[i] for i in known])
+            found[figure] = shared.figure_of(self.job.points, each, [spans[i] for i in known])
         if angle := self.scalars.get(square.name, {}).get("angle_arcsec"):
             arm = min(spans)
-            found["squareness"] = figure_of(self.job.points, [(angle, ARCSECOND * arm, title(square.name))], [arm])
-        return decided(self.job, found)
+            found["squareness"] = shared.figure_of(
+                self.job.points, [(angle, ARCSECOND * arm, title(square.name))], [arm]
+            )
+        return shared.decided(self.job, found)
 
     @cached_property
     def reported(self) -> Reported:
@@ -325,22 +314,18 @@ def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
     ``[artefact] plane`` says which plane; all else as :func:`~cmm_uq.artefacts.shift.axis.analyse_shift`.
     """
-    stated = job.facts.recording.u_coordinate_um
+    stated, chain = job.facts.recording.u_coordinate_um, job.facts.machine.chain
     plate, known = checked_plate(job)
     sigma = None if stated is None else stated * MICROMETRE
-    return PlaneShiftResult(
-        job, estimate_plane(plate, known, chain=job.facts.machine.chain, sigma=sigma, seed=seed, progress=progress)
-    )
+    return PlaneShiftResult(job, estimate_plane(plate, known, chain=chain, sigma=sigma, seed=seed, progress=progress))
 
 
 def checked_plate(job: Job) -> tuple[PlacedPlate, KnownSpan | None]:
     check_facts(job)
     facts = shared.shift_facts(job)
     plate = placed_plate(job.points, str(facts.plane), job.recording_path)
-    return plate, None if facts.known is None else _known(facts.known, plate)
 
+    def apart(first: int, last: int) -> float:
+        return float(np.linalg.norm(plate.balls[last] - plate.balls[first]))
 
-def _known(given: KnownLength, plate: PlacedPlate) -> KnownSpan:
-    first, last = known_points(given, plate.numbers)
-    check_known(given, float(np.linalg.norm(plate.balls[last] - plate.balls[first])))
-    return KnownSpan(first, last, given.length_mm, given.u_um * MICROMETRE)
+    return plate, None if facts.known is None else known_span(facts.known, plate.numbers, apart)

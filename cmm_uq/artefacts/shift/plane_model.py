@@ -13,7 +13,9 @@ moves along it.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -25,6 +27,7 @@ from cmm_uq.artefacts.shift.smooth import SmoothFunction, SmoothModel
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.machine.physics.kinematics import carried_offset
 
@@ -57,6 +60,12 @@ def plane_model(plate: PlacedPlate, known: KnownSpan | None, chain: str, sigma: 
     """
     balls, turned, moved = plate.balls, plate.turned, plate.moved
     turning, lever = _turning(plate, chain)
+    i, j = (plate.flat - plate.middle[list(plate.axes)]).T
+    of_machine = [
+        np.r_[-i, 0 * i],
+        np.r_[0 * j, -j],
+        np.r_[-j, 0 * j],
+    ]  # −e for one unit of scale of both axes and of c
     functions = _functions(plate, turning, chain)
     noise = np.tile(plate.noise_scale, 2)
     for round_ in range(_ROUNDS):
@@ -64,7 +73,7 @@ def plane_model(plate: PlacedPlate, known: KnownSpan | None, chain: str, sigma: 
         placings, to_readings = _rigid_columns(plate, balls, turned)
         flat = np.hstack([placings, to_readings @ tied])
         extra = [] if column is None else [to_readings @ column]
-        columns = np.column_stack([*_machine_columns(plate), *extra])
+        columns = np.column_stack([*of_machine, *extra])
         sd = np.array([SCALE_SD, SCALE_SD, SQUARENESS_SD, *([known.u] if known and extra else [])])
         expected = moved[plate.placing] + np.einsum("nij,nj->ni", rotations(turned)[plate.placing], balls[plate.ball])
         observed = (plate.flat - expected).T.ravel() - to_readings @ held
@@ -120,13 +129,6 @@ def _rigid_columns(plate: PlacedPlate, balls: Floats, turned: Floats) -> tuple[F
     return placings[:, :, 1:].reshape(2 * n, -1), to_readings.reshape(2 * n, -1)
 
 
-def _machine_columns(plate: PlacedPlate) -> list[Floats]:
-    """−e for one unit of scale of both axes and of c."""
-    i, j = (plate.flat - plate.middle[list(plate.axes)]).T
-    none = np.zeros_like(i)
-    return [np.r_[-i, none], np.r_[none, -j], np.r_[-j, none]]
-
-
 def _turning(plate: PlacedPlate, chain: str) -> tuple[tuple[int, ...], tuple[tuple[bool, bool], ...]]:
     """Carriages whose rotation shows, and which of the two readings their levers have."""
     one = np.ones((1, 3))
@@ -147,8 +149,9 @@ def _functions(plate: PlacedPlate, turning: tuple[int, ...], chain: str) -> tupl
     ]  # fmt: skip
     for axis in turning:
         offset = carried_offset(AXES[axis], plate.reading - plate.middle, chain=chain)[:, [i, j]]
-        shown.append((axis, ROTATION[AXES[axis], AXES[3 - i - j]].name, np.r_[offset[:, 1], -offset[:, 0]],
-                      _TYPICAL_ROTATION))  # fmt: skip
+        shown.append(
+            (axis, ROTATION[AXES[axis], AXES[3 - i - j]].name, np.r_[offset[:, 1], -offset[:, 0]], _TYPICAL_ROTATION)
+        )
     return tuple(
         SmoothFunction(
             name, *plate.span(axis), _SHORTEST * (plate.span(axis)[1] - plate.span(axis)[0]),
@@ -174,23 +177,11 @@ class FreeInPlane:
 
     @property
     def names(self) -> frozenset[str]:
-        """All that is not determined by itself."""
         return frozenset(name for combination in self.combinations for name in combination)
 
-    @property
-    def size_known(self) -> bool:
-        """Whether both scales are determined."""
-        return self.names.isdisjoint(effect.name for effect in SCALE.values())
-
-    @property
-    def square_known(self) -> bool:
-        """Whether the squareness is determined."""
-        return self.names.isdisjoint(effect.name for effect in SQUARENESS.values())
-
-    @property
-    def straight_known(self) -> bool:
-        """Whether both straightnesses are determined."""
-        return self.names.isdisjoint(effect.name for effect in STRAIGHTNESS.values())
+    def determines(self, effects: Mapping[Any, Effect]) -> bool:
+        """Whether all of these effects are determined, each by itself."""
+        return self.names.isdisjoint(effect.name for effect in effects.values())
 
 
 def free_in_plane(plate: PlacedPlate, model: PlaneModel) -> FreeInPlane:
@@ -233,13 +224,9 @@ def _periods(plate: PlacedPlate) -> tuple[float | None, float | None]:
     """Common period of the shifts along each axis among placings that are not turned against each other."""
     if np.any(np.abs(plate.turned_deg) > _SQUARE_DEG):
         return None, None
-    i, j = (_period(np.unique(np.round(shifts, 1))) for shifts in plate.middles.T)
-    return i, j
-
-
-def _period(shifts: Floats) -> float | None:
-    apart = shifts[np.r_[True, np.diff(shifts) > 1.0]]
-    return common_period(apart) if len(apart) > 1 else None
+    each = (np.unique(np.round(shifts, 1)) for shifts in plate.middles.T)
+    i, j = (shifts[np.r_[True, np.diff(shifts) > 1.0]] for shifts in each)
+    return common_period(i) if len(i) > 1 else None, common_period(j) if len(j) > 1 else None
 
 
 def title(name: str) -> Text:

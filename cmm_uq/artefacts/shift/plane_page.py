@@ -11,13 +11,14 @@ from cmm_uq.base import messages
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, after, listed, number, plural, say, signed
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table, figure_columns
+from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table, figure_columns, section
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.sections.method import not_converged
 from cmm_uq.certificate.sections.results import Left
 from cmm_uq.certificate.wording import SIGN
+from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.maths.uncertainty.quantity import rounded
 
 
@@ -37,7 +38,7 @@ def shift_results(result: PlaneShiftResult) -> dict[str, Any]:
         "artefact": {
             "point": plate.numbers.tolist(), "first_mm": first.tolist(), "second_mm": second.tolist(),
             "u_first_um": u_first.tolist(), "u_second_um": u_second.tolist(), "U_first_mm": U_first.tolist(),
-            "U_second_mm": U_second.tolist(), "size_determined": free.size_known,
+            "U_second_mm": U_second.tolist(), "size_determined": free.determines(SCALE),
         },
         "placings": [
             {"measurement": number, "turned_deg": turn, "middle_mm": middle, "balls": count}
@@ -55,42 +56,23 @@ def shift_results(result: PlaneShiftResult) -> dict[str, Any]:
 EVERY = 4  # every so many of the positions stand in the table of a curve
 
 
-def _curves(result: PlaneShiftResult) -> Section:
-    pictures = (_picture(result, printed) for printed in result.printed)
-    return Section(
-        say("Errors of the axes"), (*pictures, *(_table(result, AXES[a]) for a in result.estimate.plate.axes))
-    )
-
-
 def _picture(result: PlaneShiftResult, printed: PrintedCurve) -> Plot:
     words, error, band = title(printed.name), printed.curve.error / printed.size, printed.curve.band / printed.size
     free = say("These placings do not determine it.") if printed.name in result.estimate.free.names else NOTHING
+    caption = say("{words:capital}, with the band that holds the whole curve with 95 % probability.", words=words)
     return curve_with_band(
-        printed.curve.position,
-        error,
-        band,
-        x_label=say("Scale reading {axis} / mm", axis=Verbatim(printed.axis)),
-        y_label=say("Error / {unit}", unit=printed.unit),
-        caption=after(
-            say("{words:capital}, with the band that holds the whole curve with 95 % probability.", words=words), free
-        ),
+        printed.curve.position, error, band, x_label=say("Scale reading {axis} / mm", axis=Verbatim(printed.axis)),
+        y_label=say("Error / {unit}", unit=printed.unit), caption=after(caption, free),
         alternative=say(
             "{words:capital} runs from {low} to {high} {unit}; the band is at most {band:.1f} {unit} to each side.",
-            words=words,
-            low=signed(error.min(), ".1f"),
-            high=signed(error.max(), ".1f"),
-            unit=printed.unit,
-            band=band.max(),
+            words=words, low=signed(error.min(), ".1f"), high=signed(error.max(), ".1f"), unit=printed.unit, band=band.max(),
         ),
-    )
+    )  # fmt: skip
 
 
 _KINDS = {
-    "linearity": say("Linearity"),
-    "straightness": say("Straightness"),
-    "rotation": say("Rotation"),
-    "scale": say("Scale"),
-}
+    "linearity": say("Linearity"), "straightness": say("Straightness"), "rotation": say("Rotation"), "scale": say("Scale"),
+}  # fmt: skip
 
 
 def _table(result: PlaneShiftResult, axis: str) -> Table:
@@ -99,10 +81,10 @@ def _table(result: PlaneShiftResult, axis: str) -> Table:
     cells: list[list[Text]] = [[number(x, ".1f") for x in own[0].curve.position[::EVERY]]]
     for one in own:
         columns += figure_columns(_KINDS[one.name.split("_")[0]], say("U"), unit=one.unit)
-        U = result.stated_along(one.curve, one.size, one.unit) / one.size
+        error, U = one.curve.error / one.size, result.stated_along(one.curve, one.size, one.unit) / one.size
         pairs = [
             rounded(e, half) if half > 1e-9 else (Number("0"), Number("0"))
-            for e, half in zip((one.curve.error / one.size)[::EVERY], U[::EVERY], strict=True)
+            for e, half in zip(error[::EVERY], U[::EVERY], strict=True)
         ]
         cells += [list(column) for column in zip(*pairs, strict=True)]
     whole = say(
@@ -122,46 +104,43 @@ def _residuals(result: PlaneShiftResult) -> Section:
     before, after = (r / MICROMETRE for r in result.estimate.residuals)
     first, second = (say("{plane} / mm", plane=Verbatim(axis)) for axis in plate.plane)
     plot = vector_plot(
-        plate.flat,
-        [(say("Without curves"), before), (say("With the curves"), after)],
-        axis_labels=(first, second),
+        plate.flat, [(say("Without curves"), before), (say("With the curves"), after)], axis_labels=(first, second),
         caption=say("What the placings disagree by, with scales and squareness alone, and with the curves."),
         alternative=say(
             "The placings disagree by {before:.2f} µm rms without and {after:.2f} µm with the curves.",
-            before=without,
-            after=with_curves,
+            before=without, after=with_curves,
         ),
-    )
+    )  # fmt: skip
     return Section(say("Residuals"), (plot,))
 
 
 def sections(result: PlaneShiftResult) -> list[Section]:
-    parts = (_figures, _plate, _curves, _open, _residuals, _placings, _method)
-    return [part(result) for part in parts]
+    pictures = (_picture(result, printed) for printed in result.printed)
+    tables = (_table(result, axis) for axis in result.plane)
+    curves = section(say("Errors of the axes"), *pictures, *tables)
+    parts = (part(result) for part in (_open, _residuals, _placings, _method))
+    return [_figures(result), _plate(result), curves, *parts]
 
 
 def warnings(result: PlaneShiftResult) -> list[Text]:
     found = not_converged(result.estimate.chains)
-    if together := [_with_each_other(c) for c in result.estimate.free.combinations]:
-        found.append(
-            say(
-                "Not determined by these placings: {names}. Curves of these names rest on the assumption that "
-                "they are small and smooth.",
-                names=listed(together),
-            )
+    together = []
+    for names in result.estimate.free.combinations:
+        words, *others = (title(name) for name in names)
+        for other in others:
+            words = say("{one} with {other}", one=words, other=other)
+        together.append(words)
+    if together:
+        undetermined = say(
+            "Not determined by these placings: {names}. Curves of these names rest on the assumption that "
+            "they are small and smooth.",
+            names=listed(together),
         )
+        found.append(undetermined)
     return found
 
 
-def _with_each_other(names: tuple[str, ...]) -> Text:
-    together, *others = (title(name) for name in names)
-    for other in others:
-        together = say("{one} with {other}", one=together, other=other)
-    return together
-
-
 def measured(result: PlaneShiftResult) -> Text:
-    """What was measured, in a line."""
     name, plate = Verbatim(result.job.facts.machine.name), result.estimate.plate
     plane, p, s = Verbatim(plate.plane), len(plate.numbers), len(plate.placings)
     return say(
@@ -213,21 +192,16 @@ def _open(result: PlaneShiftResult) -> Section:
         one = say("{words:capital} can change without changing any reading.", words=words)
         many = say("{words:capital} can change together without changing any reading.", words=words)
         texts.append(plural(len(combination), one=one, many=many))
-    if not free.square_known:
-        texts.append(
-            say(
-                "A plate that is only shifted shears and stretches as the machine does: a placing turned by 90° parts them."
-            )
-        )
-    if not free.size_known:
-        texts.append(say("The common scale of both axes needs one known length between two balls."))
-    if not free.straight_known:
-        texts.append(
-            say(
-                "An axis that bends as it turns looks like a placing that is turned: shift along the other "
-                "axis too, or turn the plate by 180°."
-            )
-        )
+    shears = say(
+        "A plate that is only shifted shears and stretches as the machine does: a placing turned by 90° parts them."
+    )
+    size = say("The common scale of both axes needs one known length between two balls.")
+    bends = say(
+        "An axis that bends as it turns looks like a placing that is turned: shift along the other "
+        "axis too, or turn the plate by 180°."
+    )
+    for known, what in ((SQUARENESS, shears), (SCALE, size), (STRAIGHTNESS, bends)):
+        texts += [] if free.determines(known) else [what]
     periods = [
         say("{period:.2g} mm along {axes}", period=period, axes=Verbatim(axis.upper()))
         for axis, period in zip(result.plane, free.periods, strict=True)
@@ -263,23 +237,22 @@ def _placings(result: PlaneShiftResult) -> Section:
 
 
 def _plate(result: PlaneShiftResult) -> Section:
-    free = result.estimate.free
-    blocks: list[Block] = []
-    if free.square_known:
-        mean, _, expanded_places = result.balls
+    free, tables = result.estimate.free, list[Block]()
+    if free.determines(SQUARENESS):
+        mean, _, U = result.balls
         cells = tuple(
             (number(ball), *(text for x, s in zip(place, spread, strict=True) for text in _coordinate(x, s)))
-            for ball, place, spread in zip(result.estimate.plate.numbers, mean, expanded_places, strict=True)
+            for ball, place, spread in zip(result.estimate.plate.numbers, mean, U, strict=True)
         )
         places = figure_columns(say("First"), say("U"), say("Second"), say("U"), unit=unit("mm"))
         note: Text = say(
             "From the first ball, along the axes as the plate lay in the first placing. U, for a coverage probability of "
             "95 %, is of the best fit of all balls."
         )
-        if not free.size_known:
+        if not free.determines(SCALE):
             note = after(note, say("Their common scale is not determined: it is that of the machine."))
-        blocks.append(Table(say("The plate's own geometry"), (Column(say("Ball")), *places), cells, (note,)))
-    return shared.artefact_section(result.job, say("Uncalibrated plate, shifted and turned"), say("balls"), (), *blocks)
+        tables.append(Table(say("The plate's own geometry"), (Column(say("Ball")), *places), cells, (note,)))
+    return shared.artefact_section(result.job, say("Uncalibrated plate, shifted and turned"), say("balls"), (), *tables)
 
 
 def _coordinate(x: float, U: float) -> tuple[Text, Text]:

@@ -5,6 +5,8 @@ of such draws lies above the truth, and never holds a straight curve. Here the d
 positions get one factor k, from the draws, that holds them all at once: the largest lies between the largest d_ij − k·u_ij,
 no less than 0, and the largest d_ij + k·u_ij. With 99.5 % it says which pairs can be the largest at all, and with 95.5 % of
 these alone (Bonferroni).
+
+Errors of a shifted axis, or of the two axes of a plane, are decided against the limits of a laboratory.
 """
 
 from __future__ import annotations
@@ -18,14 +20,16 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.analysis.conformity.standards import decidable, statement
 from cmm_uq.analysis.conformity.statement import Statement, by_standard
-from cmm_uq.artefacts.kinds import ShiftFacts
+from cmm_uq.artefacts.kinds import SHIFT, ShiftFacts
 from cmm_uq.artefacts.shift.smooth import Coefficients
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say
-from cmm_uq.base.points import AXES, Floats, Machine
+from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.certificate.clauses import artefact_rows, certificate_rows, traceability_section
-from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
+from cmm_uq.certificate.document import Block, Facts, Paragraph, Section, section
 from cmm_uq.certificate.origin import file_name, quantity_data
 from cmm_uq.certificate.result import StatedUncertainty
 from cmm_uq.certificate.results.contents import covariance_data, head, statement_data
@@ -33,7 +37,8 @@ from cmm_uq.certificate.sections.results import Left, stated_table
 from cmm_uq.certificate.wording import SIGN
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, error_map_csv
+from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure
+from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
 from cmm_uq.maths.inference.draws import Draws, by_ensemble
 from cmm_uq.maths.inference.ensembles import Chains
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of, nominal, significant
@@ -130,8 +135,6 @@ _STILL = 1e-9  # part of the largest spread in a list up to which an item does n
 
 @dataclass(frozen=True, eq=False)
 class Estimated(ABC):
-    """All that the readings say."""
-
     coefficients: Coefficients  # joint draws of everything linear
     chains: Chains  # of the hyper-parameters, and how they converged
     seed: int  # of everything random
@@ -154,7 +157,6 @@ class ShiftFound(ABC):
 
     @property
     def statements(self) -> tuple[Statement, ...]:
-        """What the job wishes to be decided."""
         return ()
 
     @cached_property
@@ -198,7 +200,6 @@ class ShiftFound(ABC):
 
     @cached_property
     def stating(self) -> StatedUncertainty:
-        """How quantities are stated: not below the laboratory's capability."""
         return StatedUncertainty.of(self.job)
 
     def stated_along(self, curve: Curve, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
@@ -214,7 +215,6 @@ class ShiftFound(ABC):
 
     @property
     def repeatability(self) -> Quantity:
-        """Standard uncertainty of one reading, µm."""
         return Quantity.of_draws(self.estimate.sigma / MICROMETRE, unit("µm"))
 
 
@@ -227,6 +227,59 @@ def listed_draws(place: str, draws: Floats, unit: str) -> Reported:
 
 def shift_facts(job: Job) -> ShiftFacts:
     return cast("ShiftFacts", job.facts.artefact)
+
+
+OF_AN_AXIS = "linearity"
+
+
+class ShiftedReadings(Artefact):
+    """The recording with what its curves and angles come to, for decisions: no list of effects moves its points."""
+
+    kind = "shift"
+    title = Verbatim("shift")
+
+    def __init__(self, points: Points, figures: Mapping[str, ArtefactFigure]) -> None:
+        self.points, self._figures, self.rows = points, figures, np.arange(len(points))[:, None]
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        return true_xyz
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        return np.zeros((len(xyz), displacement.shape[2]))
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        return self._figures
+
+
+def figure_of(
+    points: Points, each: Sequence[tuple[Quantity, float, Text]], lengths_mm: Sequence[float]
+) -> ArtefactFigure:
+    """Some quantities, each with its unit in mm and what it is of: u is half the longer side of its interval."""
+    size = np.array([mm for _, mm, _ in each])
+    value = np.array([found.value for found, _, _ in each])
+    ends = np.array([found.interval95 for found, _, _ in each]).reshape(-1, 2)
+    u = 0.5 * np.maximum(value - ends[:, 0], ends[:, 1] - value)
+    rows = np.tile(np.arange(len(points)), (len(each), 1))
+    return ArtefactFigure(size * value, rows, np.array(lengths_mm), size * u, tuple(name for _, _, name in each))
+
+
+def decided(job: Job, figures: Mapping[str, ArtefactFigure]) -> tuple[Statement, ...]:
+    readings = ShiftedReadings(job.points, figures)
+    return tuple(
+        statement(wish, readings, {}, f"[[conformity]] {i}", SHIFT.tested, None, job.circumstances)
+        for i, wish in enumerate(job.facts.conformity, 1)
+    )
+
+
+def refuse_undecidable(job: Job) -> None:
+    for i, wish in enumerate(job.facts.conformity, 1):
+        _, characteristic = decidable(wish, SHIFT.name, f"[[conformity]] {i}", SHIFT.tested, job.circumstances)
+        if shift_facts(job).plane is None and characteristic.name != OF_AN_AXIS:
+            raise CmmUqError(
+                f"the {characteristic.name} is none of an axis by itself",
+                where=f"job.toml [[conformity]] {i} characteristic",
+                fix=f'Decide "{OF_AN_AXIS}", or shift a plate in a plane',
+            )
 
 
 def table_file(job: Job) -> str:
@@ -292,7 +345,7 @@ def artefact_section(
     return traceability_section(job, (*rows, *certificate_rows(facts.certificate), *shifts), *further)
 
 
-def method_section(result: ShiftFound, text: Text, readings: int, *further: Block) -> Section:
+def method_section(result: ShiftFound, text: Text, readings: int, *further: Block | None) -> Section:
     chains = result.estimate.chains
     reached = say(
         "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time {time:.1f} of {steps} steps",
@@ -301,7 +354,7 @@ def method_section(result: ShiftFound, text: Text, readings: int, *further: Bloc
     )  # fmt: skip
     sampler = say("{sampler}, seed {seed}", sampler=Verbatim(chains.sampler), seed=result.estimate.seed)
     rows = ((say("Readings (means)"), number(readings)), (say("Sampler"), sampler), (say("Convergence"), reached))
-    return Section(say("Method"), (Paragraph(text), Facts(rows), *further))
+    return section(say("Method"), Paragraph(text), Facts(rows), *further)
 
 
 _DECIMALS = 3  # of the table's µm and ″
@@ -322,11 +375,6 @@ def error_map_of(found: Mapping[int, tuple[Floats, Floats]], machine: Machine) -
     """Error map of positions and errors (m, 6) of some carriages, rounded as in a table; everything else zero."""
     x, y, z = (_carriage(machine.travel_mm[a], found.get(a)) for a in range(3))
     return ErrorMap((x, y, z))
-
-
-def table_text(table: ErrorMap) -> bytes:
-    """The table as the CSV that ``[machine] error_map`` names."""
-    return error_map_csv(table).encode()
 
 
 def _carriage(travel: Floats, found: tuple[Floats, Floats] | None) -> AxisErrors:

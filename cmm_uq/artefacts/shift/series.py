@@ -128,9 +128,10 @@ def _check_shifts(shifts: Floats, placings: Ints) -> None:
             i, j = sorted((int(one), int(other)))
             raise CmmUqError(
                 f"series {placings[i]} and {placings[j]} have the same shift, {shifts[i]:g} mm: a shift of zero against "
-                "each other shows nothing of the machine", where=where,
+                "each other shows nothing of the machine",
+                where=where,
                 fix=f"Shift series {placings[j]} by about the pitch of the points; the same place read again is a repeat",
-            )  # fmt: skip
+            )
 
 
 def _check_order(reading: Floats, series: Ints, placings: Ints, number: Ints, lines: Ints, where: str) -> None:
@@ -145,32 +146,31 @@ def _check_order(reading: Floats, series: Ints, placings: Ints, number: Ints, li
             row = rows[bad[0] + 1]
             raise CmmUqError(
                 f"series {placing}, point {number[row]} reads {reading[row]:g} mm, out of order after "
-                f"{reading[row - 1]:g} mm", where=f"{where} line {lines[row]}" if lines[row] else where or None,
+                f"{reading[row - 1]:g} mm",
+                where=f"{where} line {lines[row]}" if lines[row] else where or None,
                 fix="Number the points along the artefact, in every series the same way, or read this placing again",
-            )  # fmt: skip
+            )
 
 
 def _check_common(series: Ints, point: Ints, numbers: Ints, placings: Ints, where: str) -> None:
     """A point that was read in one placing only says nothing; with two series both must have the same length."""
-    alone = np.flatnonzero(np.bincount(point, minlength=len(numbers)) < 2)
+    alone, counts = np.flatnonzero(np.bincount(point) < 2), np.bincount(series)
     if alone.size:
-        there = placings[series[point == alone[0]][0]]
-        lengths = ", ".join(str(int((series == s).sum())) for s in range(len(placings)))
-        problem = f"point {numbers[alone[0]]} is read in series {there} only (the series have {lengths} points)"
-        fix = f"Read point {numbers[alone[0]]} in another series as well, or leave it out of series {there}"
+        number, there = numbers[alone[0]], placings[series[point == alone[0]][0]]
+        problem = (
+            f"point {number} is read in series {there} only (the series have {', '.join(map(str, counts))} points)"
+        )
+        fix = f"Read point {number} in another series as well, or leave it out of series {there}"
         raise CmmUqError(problem, where=where or None, fix=fix)
-    for s, placing in enumerate(placings):
-        if (series == s).sum() < 2:
-            raise CmmUqError(f"series {placing} has fewer than two points", where=where or None,
-                             fix="Read more points in this placing, or leave it out")  # fmt: skip
+    if counts.min() < 2:
+        problem, fix = "has fewer than two points", "Read more points in this placing, or leave it out"
+        raise CmmUqError(f"series {placings[np.argmin(counts)]} {problem}", where=where or None, fix=fix)
 
 
 def _check_places(reading: Floats, series: Ints, point: Ints, shifts: Floats, placings: Ints, where: str) -> None:
     """Each placing must stand where its shift says, and read part of a range that another reads too."""
-    base = np.zeros(point.max() + 1)
-    base[point] = reading - shifts[series]
-    lowest = np.array([reading[series == s].min() for s in range(len(placings))])
-    highest = np.array([reading[series == s].max() for s in range(len(placings))])
+    each = [reading[series == s] for s in range(len(placings))]
+    lowest, highest = (np.array([end(readings) for readings in each]) for end in (np.min, np.max))
     length = float(np.ptp(reading - shifts[series]))
     for s, placing in enumerate(placings):
         others = np.arange(len(placings)) != s
@@ -180,11 +180,10 @@ def _check_places(reading: Floats, series: Ints, point: Ints, shifts: Floats, pl
                 "read twice", where=where or None,
                 fix=f"Shift it by less than the {highest[s] - lowest[s]:g} mm it covers, best by the pitch of its points",
             )  # fmt: skip
-    first = {int(p): float(r) for p, r in zip(point[series == 0], reading[series == 0], strict=True)}
+    first = dict(zip(point[series == 0].tolist(), each[0].tolist(), strict=True))
     for s, placing in enumerate(placings[1:], 1):
-        moved = [
-            r - first[int(p)] for p, r in zip(point[series == s], reading[series == s], strict=True) if int(p) in first
-        ]
+        read = zip(point[series == s].tolist(), each[s].tolist(), strict=True)
+        moved = [r - first[p] for p, r in read if p in first]
         nominal = shifts[s] - shifts[0]
         if moved and abs(np.mean(moved) - nominal) > max(1.0, min(_MISPLACED * length, 0.5 * abs(nominal))):
             problem = f"series {placing} is shifted by {np.mean(moved):.4g} mm against the first, not by {nominal:g} mm"
@@ -206,7 +205,7 @@ def _cosines(means: Floats, series: Ints, along: int) -> Floats:
 
 # shifts whose rest is below this part of the smallest are multiples of each other, as far as smooth functions can
 # see
-_ALIKE_of_undetermined = 0.05
+_MULTIPLE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +245,7 @@ def undetermined(series: ShiftedSeries, *, scale_known: bool) -> Undetermined:
     free = free - known @ (known.T @ free)
     basis, sizes, _ = np.linalg.svd(free, full_matrices=False)
     # pitches and shifts a little off their nominals leave of the slope itself no more than their own relative error
-    return Undetermined(common_period(series.shifts), basis[:, sizes > _ALIKE_of_undetermined])
+    return Undetermined(common_period(series.shifts), basis[:, sizes > _MULTIPLE])
 
 
 def common_period(shifts: Floats) -> float:
@@ -255,7 +254,7 @@ def common_period(shifts: Floats) -> float:
     smallest = float(np.diff(np.sort(shifts)).min())
     for shift in np.abs(shifts - shifts[0])[1:]:
         one, other = found, float(shift)
-        while other > _ALIKE_of_undetermined * smallest:
+        while other > _MULTIPLE * smallest:
             rest = one % other
             one, other = other, min(rest, other - rest)
         found = one

@@ -365,8 +365,6 @@ class SmoothModel:
 
 @dataclass(frozen=True, eq=False)
 class Coefficients:
-    """Joint draws of everything linear."""
-
     model: SmoothModel
     coefficients: Floats  # (N, J) of all functions' sines
     growth: Floats  # (N,) the ends' size over the middle's

@@ -21,10 +21,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Number, Text, number, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Plot, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
+from cmm_uq.certificate.document import Plot, Section, Table, columns, figure_columns
+from cmm_uq.certificate.plots.residuals import deviations_plot, volume_plot
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating, numbered
+from cmm_uq.certificate.wording import numbered
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Forms, Placings
@@ -147,7 +147,6 @@ def sphere(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
 
 
 def sphere_places(setting: Setting) -> tuple[SetUp, ...]:
-    """Once in the middle of the volume."""
     return (setting.volume.set_up(sphere(setting.artefact, setting.plan), np.eye(3), MIDDLE, say("in the middle")),)
 
 
@@ -158,7 +157,6 @@ PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.
 
 
 def results(result: Result) -> dict[str, Any]:
-    """Form and size errors for results.json."""
     forms = cast("SphereArtefact", result.artefact).forms()
     sizes = [None] * len(forms.form) if forms.size is None else (forms.size / MICROMETRE).tolist()
     each = (forms.measurement.tolist(), forms.repeat.tolist(), forms.count.tolist(), (forms.form / MICROMETRE).tolist())
@@ -174,25 +172,23 @@ def sections(result: Result) -> list[Section]:
 
 def _table(result: Result, sphere: SphereArtefact) -> Table:
     forms, size, noise = sphere.forms(), sphere.sizes[0], result.noise.expanded
-    repeated = forms.repeat.max() > 1
+    repeated, least = forms.repeat.max() > 1, max(sphere.form / MICROMETRE, noise / 10)
     rows: list[tuple[Text, ...]] = []
     for i, measurement in enumerate(forms.measurement):
         place = numbered(measurement, forms.repeat[i] if repeated else None)
-        form = rounded(float(forms.form[i]) / MICROMETRE, max(sphere.form / MICROMETRE, noise / 10))[0]
         error = () if forms.size is None else (rounded(float(forms.size[i]) / MICROMETRE, noise)[0],)
-        rows.append((place, number(forms.count[i]), form, *error))
+        rows.append((place, number(forms.count[i]), rounded(float(forms.form[i]) / MICROMETRE, least)[0], *error))
     errors = [say("Form error")]
     notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
     if size.certified:
         errors.append(say("Size error"))
-        notes.append(
-            say(
-                "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
-                u=rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0"),
-            )
+        u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
+        what = say(
+            "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).", u=u
         )
-    columns = (*text_columns(say("Sphere")), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm")))
-    return Table(say("Probing errors"), columns, tuple(rows), tuple(notes))
+        notes.append(what)
+    heads = columns([say("Sphere"), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm"))])
+    return Table(say("Probing errors"), heads, tuple(rows), tuple(notes))
 
 
 def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
@@ -200,25 +196,18 @@ def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
     size, xyz = sphere.sizes[0], sphere.points.xyz
     radius = size.nominal * sphere.per_size * sphere.expansion
     deviations = np.asarray((sphere.distances(xyz, None) - radius) / MICROMETRE, dtype=np.float64)
-    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
     name = say("certified radius") if size.certified else say("mean radius")
     what = say("{count} points: as recorded they deviate", count=len(deviations))
-    return length_plot(
-        sphere.points.point,
-        deviations,
-        residuals,
-        expanded_before_um=expanded,
-        reference=name,
-        reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0,
-        flagged=result.flagged,
-        position_label=say("Point on the sphere"),
-        caption=say(
-            "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = {k}).",
-            name=name,
-            k=number(result.noise.coverage_factor, ".2f"),
-        ),
-        alternative=deviating(what, say("from the {name}", name=name), deviations, residuals),
+    caption = say(
+        "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = {k}).",
+        name=name,
+        k=number(result.noise.coverage_factor, ".2f"),
     )
+    return deviations_plot(
+        result, deviations, what, say("from the {name}", name=name), position=sphere.points.point, reference=name,
+        reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0,
+        position_label=say("Point on the sphere"), caption=caption,
+    )  # fmt: skip
 
 
 def _over(result: Result, sphere: SphereArtefact) -> Plot:

@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
-from cmm_uq.artefacts.spheres.kind import TableSpheresFacts
+from cmm_uq.artefacts.kinds import TableSpheresFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.rotary import Turntable
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Plot, Section, Table, figure_columns, text_columns
-from cmm_uq.certificate.plots.residuals import length_plot
+from cmm_uq.certificate.document import Plot, Section, Table, columns, figure_columns
+from cmm_uq.certificate.plots.residuals import deviations_plot
 from cmm_uq.certificate.result import Page, Result
-from cmm_uq.certificate.wording import deviating
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
 from cmm_uq.machine.model.recorded import place
@@ -199,18 +198,12 @@ PLANNING = Planning({"ISO 10360-3": lambda setting: (two_spheres(setting),)}, _c
 
 
 def results(result: Result) -> dict[str, Any]:
-    """Four-axis errors of each sphere for results.json."""
     artefact = cast("TableSpheres", result.artefact)
-    found = artefact.figures(np.ones(len(artefact.points), dtype=bool))
+    found, points = artefact.figures(np.ones(len(artefact.points), dtype=bool)), artefact.points
     each = []
-    for i, rows in enumerate(artefact.placings.rows):
-        first = rows[0]
-        one = {
-            "measurement": int(artefact.points.measurement[first]),
-            "point": int(artefact.points.point[first]),
-            "radius_mm": float(artefact.radius[first]),
-            "height_mm": float(artefact.axial[first]),
-        }
+    for i, (first, *_) in enumerate(artefact.placings.rows):
+        one: dict[str, Any] = {"measurement": int(points.measurement[first]), "point": int(points.point[first])}
+        one |= {"radius_mm": float(artefact.radius[first]), "height_mm": float(artefact.axial[first])}
         each.append(one | {f"{name}_um": float(found[name].values[i]) / MICROMETRE for name in FIGURES})
     return {"spheres": each}
 
@@ -218,55 +211,40 @@ def results(result: Result) -> dict[str, Any]:
 def sections(result: Result) -> list[Section]:
     artefact = cast("TableSpheres", result.artefact)
     plots = [_over_positions(result, artefact, k) for k in range(3)]
-    return [Section(say("Four-axis errors"), (_table(result, artefact), *plots))]
+    return [Section(say("Four-axis errors"), (_table(result), *plots))]
 
 
-def _table(result: Result, artefact: TableSpheres) -> Table:
-    noise = result.noise.expanded
+def _table(result: Result) -> Table:
     rows = [
         (
             say("measurement {number}, {sphere}", number=one["measurement"], sphere=sphere_name(one["point"])),
-            number(one["radius_mm"], ".1f"),
-            number(one["height_mm"], ".1f"),
-            *(rounded(one[f"{name}_um"], noise / 2)[0] for name in FIGURES),
+            *(number(one[name], ".1f") for name in ("radius_mm", "height_mm")),
+            *(rounded(one[f"{name}_um"], result.noise.expanded / 2)[0] for name in FIGURES),
         )
         for one in results(result)["spheres"]
     ]
-    columns = (
-        *text_columns(say("Sphere")),
-        *figure_columns(say("Radius"), say("Height"), unit=unit("mm")),
-        *figure_columns(*(Verbatim(name) for name in FIGURES), unit=unit("µm")),
-    )
+    places, ranges = figure_columns(say("Radius"), say("Height"), unit=unit("mm")), map(Verbatim, FIGURES)
     note = say(
         "Range of the coordinate of the centre on the table over all its positions: along the radius (FR), the tangent (FT) "
         "and the axis (FA), as recorded. Radius and height are from the stated point of the axis."
     )
-    return Table(say("Ranges"), columns, tuple(rows), (note,))
+    heads = columns([say("Sphere"), *places, *figure_columns(*ranges, unit=unit("µm"))])
+    return Table(say("Ranges"), heads, tuple(rows), (note,))
 
 
 def _over_positions(result: Result, artefact: TableSpheres, k: int) -> Plot:
-    before, after = artefact.deviations()[:, k] / MICROMETRE, result.residuals[k::3] / MICROMETRE
-    direction = _DIRECTIONS[k]
-    return length_plot(
-        artefact.points.repeat,
-        before,
-        after,
-        expanded_before_um=result.noise.expanded,
-        reference=say("mean of the sphere"),
-        flagged=result.flagged[k::3],
-        position_label=say("Position of the table, in order"),
-        caption=say(
-            "{direction:capital} coordinate of each centre about the mean of its sphere, with U (k = {k}).",
-            direction=direction,
-            k=number(result.noise.coverage_factor, ".2f"),
-        ),
-        alternative=deviating(
-            say("{count} centres deviate", count=len(before)),
-            say("{direction} from the mean of their sphere", direction=direction),
-            before,
-            after,
-        ),
+    before, direction = artefact.deviations()[:, k] / MICROMETRE, _DIRECTIONS[k]
+    caption = say(
+        "{direction:capital} coordinate of each centre about the mean of its sphere, with U (k = {k}).",
+        direction=direction,
+        k=number(result.noise.coverage_factor, ".2f"),
     )
+    return deviations_plot(
+        result, before, say("{count} centres deviate", count=len(before)),
+        say("{direction} from the mean of their sphere", direction=direction), position=artefact.points.repeat,
+        after_um=result.residuals[k::3] / MICROMETRE, flagged=result.flagged[k::3], reference=say("mean of the sphere"),
+        position_label=say("Position of the table, in order"), caption=caption,
+    )  # fmt: skip
 
 
 PAGE = Page(sections, results)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -198,16 +198,32 @@ def curve_with_band(
         return style.drawn(figure, caption, alternative, "curve")
 
 
+def deviations_plot(
+    result: Result, off_um: Floats, what: Text, from_reference: Text = NOTHING, *, position: ArrayLike | None = None,
+    after_um: Floats | None = None, expanded_um: Floats | float | None = None, spec: str = ".1f", **shown: Any,
+) -> Plot:  # fmt: skip
+    """Deviations (n,) from a reference, µm, by measurement or ``position``, and what the fitted model leaves.
+
+    ``what``: deviates, with a verb, ``from_reference``; ``after_um``: the residuals where it is left out, ``expanded_um``:
+    U, that of their noise; ``shown``: as of :func:`length_plot`.
+    """
+    after = result.residuals / MICROMETRE if after_um is None else after_um
+    return length_plot(
+        result.artefact.measurement.astype(float) if position is None else position, off_um, after,
+        expanded_before_um=result.noise.expanded if expanded_um is None else expanded_um,
+        **{"flagged": result.flagged if after_um is None else None} | shown,
+        alternative=deviating(what, from_reference, off_um, after, spec),
+    )  # fmt: skip
+
+
 def readings_plot(
     result: Result, off_um: Floats, *, reference: Text, from_reference: Text, caption: Text, scale: Floats | float = 1.0
 ) -> Plot:
-    """Readings (n,) against a reference, µm, by measurement, and what the fitted model leaves; ``scale`` of their U."""
-    residuals = result.residuals / MICROMETRE
+    """Readings (n,) against a reference, µm, by measurement; ``scale`` of their U."""
     what = say("{count} readings: as recorded they deviate", count=len(off_um))
-    return length_plot(
-        result.artefact.measurement.astype(float), off_um, residuals, expanded_before_um=result.noise.expanded * scale,
-        reference=reference, flagged=result.flagged, position_label=say("Measurement"), caption=caption,
-        alternative=deviating(what, from_reference, off_um, residuals),
+    return deviations_plot(
+        result, off_um, what, from_reference, expanded_um=result.noise.expanded * scale, reference=reference,
+        position_label=say("Measurement"), caption=caption,
     )  # fmt: skip
 
 

@@ -111,7 +111,6 @@ class Size:
 
     @property
     def certified(self) -> bool:
-        """Whether a certificate gives this size."""
         return bool(np.isfinite(self.sd))
 
 
@@ -189,8 +188,9 @@ class Artefact(ABC):
         points, rows = self.points, self.rows[observation]
         run = say(
             "measurement {measurement}, repeat {repeat}",
-            measurement=int(self.measurement[observation]), repeat=int(self.repeat[observation]),
-        )  # fmt: skip
+            measurement=int(self.measurement[observation]),
+            repeat=int(self.repeat[observation]),
+        )
         whole = np.all(np.isin(np.flatnonzero(points.group == points.group[rows[0]]), rows))
         return run if whole else say("point {point} of {run}", point=int(points.point[rows[0]]), run=run)
 
@@ -221,8 +221,9 @@ class Artefact(ABC):
         if found is None:
             return {}
         own = counts[found.rows].all(axis=1)
-        return figures_of_errors(replace(found, errors=found.errors[own], lengths=found.lengths[own], u=found.u[own],
-                                         rows=found.rows[own]))  # fmt: skip
+        return figures_of_errors(
+            replace(found, errors=found.errors[own], lengths=found.lengths[own], u=found.u[own], rows=found.rows[own])
+        )
 
     def positionings(self) -> Mapping[int, PositioningRuns]:
         """Runs that position an axis, µm, by measurement; none of what is no such run."""

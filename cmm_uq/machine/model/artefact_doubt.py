@@ -42,8 +42,6 @@ _LEAST_MM = 1e-12  # A standard uncertainty that is none
 
 @dataclass(frozen=True, eq=False)
 class CertifiedPlaces:
-    """Places as certified, and how well."""
-
     facts: ReferencedFacts  # what the job says of the artefact
     places: Floats  # (n, j) certified, mm: distances from the first face, or coordinates
     # (n, j) standard uncertainty of each by itself, mm; ``None`` where none is stated of single places
@@ -71,11 +69,7 @@ class CertifiedPlaces:
     @property
     def plain(self) -> bool:
         """Whether a number, or nothing, is stated of all lengths alike."""
-        return (
-            self.u is None
-            and self.covariance is None
-            and (self.facts.u_um is None or isinstance(self.facts.u_um, float))
-        )
+        return self.u is None and self.covariance is None and isinstance(self.facts.u_um, float | None)
 
     def u_um(self, sd_mm: float) -> float | None:
         """Standard uncertainty of the longest length, µm, as stated; ``None`` where nothing is.
@@ -157,15 +151,14 @@ class CertifiedPlaces:
 
     def _each_its_own(self) -> Floats:
         """Standard uncertainty of each coordinate, (n, j) mm, if none has to do with another."""
-        if self.places.shape[1] == 1:
+        count = self.places.shape[1]
+        if count == 1:
             away = np.abs(self.places)
             stated = np.where(away > _SAME_MM, self.facts.u_of(away) * MICROMETRE, 0.0)
         else:
             there = np.unique(self.places, axis=0)
             farthest = np.array([np.linalg.norm(there - place, axis=1).max() for place in self.places])
-            stated = np.repeat(
-                self.facts.u_of(farthest)[:, None] * MICROMETRE / np.sqrt(2.0), self.places.shape[1], axis=1
-            )
+            stated = np.repeat(self.facts.u_of(farthest)[:, None] * MICROMETRE / np.sqrt(2.0), count, axis=1)
         return np.asarray(stated if self.u is None else np.maximum(stated, self.u), dtype=np.float64)
 
     def _with_the_longest(self, sd_mm: float, first: int, last: int) -> Floats:
@@ -259,8 +252,6 @@ _FLAT = 0.05  # extent across a flat artefact over that along it
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of an artefact's own places."""
-
     um: float  # largest plausible standard deviation of a place from where it should be, µm
     weight: float  # how readily it is thought of, beside the machine's errors
     mostly: float = 1.0  # part of it that a certificate leaves
@@ -281,14 +272,9 @@ def since_earlier(um: float) -> Known:
 
 
 def faults(
-    facts: ArtefactFacts,
-    points: Points,
-    body: Body,
-    known: Known,
-    *,
-    axes: int = 3,
+    facts: ArtefactFacts, points: Points, body: Body, known: Known, *, axes: int = 3,
     geometry: Iterable[OwnFault] = tuple(GEOMETRY.values()),
-) -> Iterable[Effect]:
+) -> Iterable[Effect]:  # fmt: skip
     own = FaultyArtefact(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
     if axes * len(body.places) <= MOST_ERRORS and deformations(own).shape[1]:
         yield PATTERN.made(own)

@@ -138,8 +138,9 @@ class RecordingModel:
             if not largest < _NO_MACHINE:
                 raise CmmUqError(
                     f"errors that would explain this recording exceed {_NO_MACHINE:g} mm: they are no machine's",
-                    where="the recording", fix="Look for a wrong unit, exchanged columns or points of different places",
-                )  # fmt: skip
+                    where="the recording",
+                    fix="Look for a wrong unit, exchanged columns or points of different places",
+                )
         return indicated
 
     def predicted(self, values: Floats) -> Floats:

@@ -55,9 +55,10 @@ def noise_of(
         slow, frequency, gap, part = _in_turn(
             passes[chosen], artefact.points.point[rows[:, 0]], artefact.noise_scale[chosen]
         )
+    parts, longer = axes / axes.sum(axis=1, keepdims=True), length[length > _NO_LENGTH * length.max(initial=0.0)]
     possible = {
-        AXES: _axes_differ(axes), PLACING: bool(np.any(np.bincount(block) > 1)),
-        GROWTH: _lengths_differ(length), SLOW: slow.shape[1] > 0,
+        AXES: bool(np.sum(np.ptp(parts, axis=0) > _LEAST_SHARE) >= 2), PLACING: bool(np.any(np.bincount(block) > 1)),
+        GROWTH: bool(len(longer)) and bool(longer.max() > _LEAST_SPREAD * np.median(longer)), SLOW: slow.shape[1] > 0,
     }  # fmt: skip
     return Components(
         turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step,
@@ -199,16 +200,6 @@ def axis_variances(along: Floats, noise_scale: Floats) -> Floats:
     equal = np.full_like(squares, 1 / 3)
     parts = np.where(total > 0, squares / np.where(total > 0, total, 1.0), equal)
     return np.asarray(parts * noise_scale[:, None] ** 2)
-
-
-def _axes_differ(axes: Floats) -> bool:
-    parts = axes / axes.sum(axis=1, keepdims=True)
-    return bool(np.sum(np.ptp(parts, axis=0) > _LEAST_SHARE) >= 2)
-
-
-def _lengths_differ(length: Floats) -> bool:
-    longer = length[length > _NO_LENGTH * length.max(initial=0.0)]
-    return bool(len(longer)) and bool(longer.max() > _LEAST_SPREAD * np.median(longer))
 
 
 def growing_lengths(model: RecordingModel, xyz: Floats) -> Floats:

@@ -198,5 +198,6 @@ class Rigid(Artefact):
             raise CmmUqError(
                 f"the recorded positions do not have the shape of this {self.title.lower()}: in measurement {number} they "
                 f"miss it by {100 * misfit[0]:.2g} % of its extent",
-                where=place(self.points, self.points.measurement == number, where), fix=fix,
-            )  # fmt: skip
+                where=place(self.points, self.points.measurement == number, where),
+                fix=fix,
+            )

@@ -69,8 +69,6 @@ SAME = Frame(np.eye(3), np.zeros(3))
 
 @dataclass(frozen=True, eq=False)
 class PredictedErrors:
-    """What a prediction says of the points of a recording."""
-
     errors: Floats  # (n, 3) indicated minus true, mm
     u: Floats  # (n,) standard uncertainty of a predicted coordinate, mm, as it is stated
     # (n,) what there is besides because the artefact was taken to lie in another direction than it did, mm
@@ -87,14 +85,9 @@ class PredictedErrors:
 
 
 def predicted_errors(
-    artefact: Artefact,
-    prediction: Prediction,
-    where: str,
-    *,
-    length_mm: float | None = None,
-    taken: Artefact | None = None,
-    exact: bool = False,
-) -> PredictedErrors:
+    artefact: Artefact, prediction: Prediction, where: str, *, length_mm: float | None = None,
+    taken: Artefact | None = None, exact: bool = False,
+) -> PredictedErrors:  # fmt: skip
     """The errors that a prediction contains, at the points of a recording.
 
     ``length_mm``: of the artefact, as the simulation took it; that of the artefact by default. ``taken``: the artefact as warm
@@ -133,32 +126,29 @@ def _sizes(artefact: Artefact, length_mm: float | None) -> Floats:
     if length_mm is None:
         return sizes
     if not sizes.size or artefact.sizes[0].name != "length_mm":
-        raise CmmUqError(f"a {artefact.title.lower()} has no length_mm", where=f"job.toml {KEY} length_mm",
-                         fix="Leave it out")  # fmt: skip
+        raise CmmUqError(
+            f"a {artefact.title.lower()} has no length_mm", where=f"job.toml {KEY} length_mm", fix="Leave it out"
+        )
     sizes[0] = length_mm
     return sizes
 
 
 def _matched(points: Points, prediction: Prediction, where: str) -> tuple[Ints, int]:
     """Row (n,) of the prediction for each recorded point, and how many rows are for none."""
-    n, of_lengths = len(points), prediction.of_lengths
-    point = np.zeros(n, dtype=np.int64) if of_lengths else points.point
-    repeat = np.ones(n, dtype=np.int64) if prediction.repeat is None else points.repeat
+    of_lengths, repeated = prediction.of_lengths, prediction.repeat is not None
+    point = np.zeros(len(points), dtype=np.int64) if of_lengths else points.point
+    repeat = points.repeat if repeated else np.ones(len(points), dtype=np.int64)
     given = np.ones_like(prediction.point) if prediction.repeat is None else prediction.repeat
-    known = {
-        key: i for i, key in enumerate(
-            zip(prediction.measurement.tolist(), prediction.point.tolist(), given.tolist(), strict=True)
-        )
-    }  # fmt: skip
+    keys = zip(prediction.measurement.tolist(), prediction.point.tolist(), given.tolist(), strict=True)
+    known = {key: i for i, key in enumerate(keys)}
     wanted = list(zip(points.measurement.tolist(), point.tolist(), repeat.tolist(), strict=True))
     for i, key in enumerate(wanted):
         if key not in known:
             line = f" line {points.lines[i]}" if len(points.lines) else ""
-            which = "" if of_lengths else f", point {key[1]}"
-            times = "" if prediction.repeat is None else f", repeat {key[2]}"
-            raise CmmUqError(f"measurement {key[0]}{which}{times}, {where}{line}, is not predicted",
-                             where=prediction.where,
-                             fix="Number the prediction as the recording, and predict every point")  # fmt: skip
+            which = f"{'' if of_lengths else f', point {key[1]}'}{f', repeat {key[2]}' if repeated else ''}"
+            fix = "Number the prediction as the recording, and predict every point"
+            problem = f"measurement {key[0]}{which}, {where}{line}, is not predicted"
+            raise CmmUqError(problem, where=prediction.where, fix=fix)
     rows = np.array([known[key] for key in wanted], dtype=np.int64)
     return rows, len(known) - len(set(wanted))
 
@@ -200,20 +190,21 @@ def _frame(prediction: Prediction, rows: Ints, recorded: Floats) -> Frame:
     ratio = float(np.linalg.norm(recorded - recorded.mean(axis=0))) / spread if spread else 0.0
     for factor, unit in _UNITS:
         if abs(ratio / factor - 1) < _LIKE_A_UNIT:
-            raise CmmUqError(f"the coordinates look like {unit}, not mm", where=prediction.where,
-                             fix=f"Convert them (times {factor:g}), or give unit in job.toml {KEY}")  # fmt: skip
-    best = min(far, key=lambda distance: float(np.median(distance)))
-    i = int(np.argmax(best))
-    mirrored = _turned(predicted * [1, 1, -1], recorded)
-    if np.linalg.norm(mirrored.of(predicted * [1, 1, -1]) - recorded, axis=1).max() <= NEAR:
+            fix = f"Convert them (times {factor:g}), or give unit in job.toml {KEY}"
+            raise CmmUqError(f"the coordinates look like {unit}, not mm", where=prediction.where, fix=fix)
+    mirrored = predicted * [1, 1, -1]
+    if np.linalg.norm(_turned(mirrored, recorded).of(mirrored) - recorded, axis=1).max() <= NEAR:
         raise CmmUqError("its frame is mirrored against the recording's: one axis has the other sign, or two are exchanged",
                          where=prediction.where,
                          fix="Name each column rightly, or turn the sign of one round, in both alike")  # fmt: skip
+    best = min(far, key=lambda distance: float(np.median(distance)))
+    row = rows[int(np.argmax(best))]
     raise CmmUqError(
-        f"measurement {prediction.measurement[rows[i]]}, point {prediction.point[rows[i]]} is predicted {best[i]:.4g} mm "
-        "from where it was recorded", where=f"{prediction.where} line {prediction.lines[rows[i]]}",
+        f"measurement {prediction.measurement[row]}, point {prediction.point[row]} is predicted {best.max():.4g} mm "
+        "from where it was recorded",
+        where=f"{prediction.where} line {prediction.lines[row]}",
         fix=f"Number it as the recording, and predict places within {NEAR:g} mm, all in one frame",
-    )  # fmt: skip
+    )
 
 
 def _turned(predicted: Floats, recorded: Floats) -> Frame:
@@ -237,9 +228,10 @@ def _refuse_absurd(errors: Floats, prediction: Prediction, rows: Ints) -> None:
         point = "" if prediction.of_lengths else f", point {prediction.point[rows[i]]},"
         raise CmmUqError(
             f"measurement {prediction.measurement[rows[i]]}{point} is predicted {size[i]:.3g} mm off the artefact, more than "
-            "any machine's error", where=f"{prediction.where} line {prediction.lines[rows[i]]}",
+            "any machine's error",
+            where=f"{prediction.where} line {prediction.lines[rows[i]]}",
             fix=f"Check its numbering and unit, and the artefact that was simulated (length_mm in {KEY})",
-        )  # fmt: skip
+        )
 
 
 WHERE = "job.toml [machine] error_map"
@@ -302,24 +294,21 @@ def tables_otherwise(maps: Sequence[ErrorMap]) -> dict[str, tuple[Text, list[Err
             errors[:, j] = np.interp(m.axes[i].positions, m.axes[j].positions, m.axes[j].errors[:, i])
         return errors
 
-    turned, square = np.repeat([1.0, -1.0], 3), [replace(m, squareness=-m.squareness) for m in maps]
-    in_rad = np.repeat([1.0, _MICRORADIANS], 3)
+    def rotated(factor: float) -> list[ErrorMap]:
+        return read(lambda m, i: m.axes[i].errors * np.repeat([1.0, factor], 3))
+
+    square = [replace(m, squareness=-m.squareness) for m in maps]
     found: dict[str, tuple[Text, list[ErrorMap]]] = {
-        "rotations_sign": (
-            say("the map's rotations have the other sign"),
-            read(lambda m, i: m.axes[i].errors * turned),
-        ),
-        "rotations_unit": (
-            say("the map's rotations are in µrad, and were read as ″"),
-            read(lambda m, i: m.axes[i].errors * in_rad),
-        ),
+        "rotations_sign": (say("the map's rotations have the other sign"), rotated(-1.0)),
+        "rotations_unit": (say("the map's rotations are in µrad, and were read as ″"), rotated(_MICRORADIANS)),
         "squareness_sign": (say("the map's squareness has the other sign"), square),
     }
     for one, other in ((0, 1), (1, 2), (0, 2)):
+        first, second = AXES[one], AXES[other]
         title = say(
             "the map's straightness of {one} along {other} and of {other} along {one} are exchanged",
-            one=Verbatim(AXES[one].upper()),
-            other=Verbatim(AXES[other].upper()),
+            one=Verbatim(first.upper()),
+            other=Verbatim(second.upper()),
         )
-        found[f"crossed_{AXES[one]}{AXES[other]}"] = title, read(partial(crossed, one, other))
+        found[f"crossed_{first}{second}"] = title, read(partial(crossed, one, other))
     return found

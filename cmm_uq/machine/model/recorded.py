@@ -48,6 +48,12 @@ def place(points: Points, rows: NDArray[np.bool_], where: str | None) -> str:
     return f"{file} line {points.lines[np.flatnonzero(rows)[0]]}" if len(points.lines) else file
 
 
+def refuse(points: Points, rows: NDArray[np.bool_], where: str | None, problem: str, fix: str) -> None:
+    """Refuse a recording for rows (n,) of it, where any are."""
+    if np.any(rows):
+        raise CmmUqError(problem, where=place(points, rows, where), fix=fix)
+
+
 def check_length(measured: float, certified: float, what: str, where: str | None) -> None:
     """Refuse lengths that differ by a factor that only a mistaken unit or another artefact explains.
 
@@ -64,9 +70,10 @@ def check_length(measured: float, certified: float, what: str, where: str | None
                              fix="Give x_mm, y_mm, z_mm and the certified lengths in mm")  # fmt: skip
     if abs(ratio - 1) > 0.01:
         raise CmmUqError(
-            f"{said}: they differ by {abs(ratio - 1) * METRE:.3g} mm/m", where=where,
+            f"{said}: they differ by {abs(ratio - 1) * METRE:.3g} mm/m",
+            where=where,
             fix="Check job.toml [artefact], and that the recording belongs to this artefact",
-        )  # fmt: skip
+        )
 
 
 def length_of(facts: ArtefactFacts, measured: float, what: str, where: str | None) -> tuple[float, float]:

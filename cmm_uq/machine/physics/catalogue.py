@@ -24,7 +24,15 @@ from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.messages import Text, foreign
 from cmm_uq.base.plugins import EFFECTS, BrokenPluginError, Plugin, offered
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.machine.physics.effect import CONTRACT, FURTHER as RARER, OWN as OF_ARTEFACTS, Effect, Parameter, Shape
+from cmm_uq.machine.physics.effect import (
+    CONTRACT,
+    FURTHER as RARER,
+    OWN as OF_ARTEFACTS,
+    Amount,
+    Effect,
+    Parameter,
+    Shape,
+)
 from cmm_uq.machine.physics.effects import (
     drives,
     own_errors,
@@ -35,7 +43,6 @@ from cmm_uq.machine.physics.effects import (
     structure,
     thermal,
 )
-from cmm_uq.machine.physics.words import Amount
 
 
 class EffectPlugin(Plugin):
@@ -43,10 +50,8 @@ class EffectPlugin(Plugin):
 
     @cached_property
     def effect(self) -> Effect:
-        return self.checked(self.loaded(Effect))  # type: ignore[type-abstract]
-
-    def checked(self, made: Effect) -> Effect:
-        """The effect with its package's name, where it says all that it must."""
+        """With its package's name, where it says all that it must."""
+        made = self.loaded(Effect)  # type: ignore[type-abstract]
         for field in ("title", "formula", "mechanism", "points_to", "coefficients"):
             if not getattr(made, field, None):
                 raise self.broken(f"says no {field}")
@@ -117,12 +122,12 @@ class _Outside(Effect):
         return self._effect.from_reported(parameters)
 
 
-def outside_effects(own: Container[str]) -> dict[str, EffectPlugin]:
+def _offered() -> dict[str, EffectPlugin]:
     """Effects that the installed packages offer, by name; none is imported."""
     found: dict[str, EffectPlugin] = {}
     for plugin in offered(EFFECTS, EffectPlugin):
         name = plugin.name
-        other = "cmm-uq" if name in own else found[name].package if name in found else None
+        other = "cmm-uq" if name in EVERY else found[name].package if name in found else None
         if other is not None:
             problem = f"{plugin.what} comes from {other} and from {plugin.package}"
             raise CmmUqError(problem, fix=f"Uninstall {plugin.package}, or rename it")
@@ -147,8 +152,9 @@ def every() -> Mapping[str, Effect]:
 
     Of an arm of joints only those that its job brings: the others are of carriages.
     """
-    if _ALONE.get():
-        return _STATED.get()
+    stated, alone = _STATED.get()
+    if alone:
+        return stated
     found, own = _every(tuple(sys.path)), _own()
     return MappingProxyType({**found, **own}) if own else found
 
@@ -156,13 +162,12 @@ def every() -> Mapping[str, Effect]:
 def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, ...]:
     """The named effects, in order. Of other packages only those named are imported."""
     outside, own, chosen, wrong = _outside(tuple(sys.path)), _own(), list[Effect](), Gathered()
-    known = {*EVERY, *outside, *own}
+    known = {*own} if _STATED.get()[1] else {*EVERY, *outside, *own}
     for i, name in enumerate(names):
         with wrong.going_on():
-            if _ALONE.get() and name not in own:
-                raise CmmUqError(f"the arm of this job has no effect {name!r}", where=where, fix=suggestion(name, own))
             if name not in known:
-                raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, known))
+                what = "the arm of this job has no" if _STATED.get()[1] else "unknown"
+                raise CmmUqError(f"{what} effect {name!r}", where=where, fix=suggestion(name, known))
             if name in names[:i]:
                 raise CmmUqError(f"the effect {name!r} is named twice", where=where, fix="Name it once")
             chosen.append(EVERY.get(name) or own.get(name) or outside[name].effect)
@@ -207,37 +212,34 @@ def refuse_known(name: str, where: str, further: Container[str] = ()) -> None:
 @contextmanager
 def beside_the_catalogue(stated: Mapping[str, Effect], *, alone: bool = False) -> Iterator[None]:
     """What a job brings of its own is in the catalogue for a while, or is all of it; nothing of another job."""
-    token, only = _STATED.set(stated), _ALONE.set(alone)
+    token = _STATED.set((stated, alone))
     try:
         yield
     finally:
         _STATED.reset(token)
-        _ALONE.reset(only)
 
 
 def registered() -> tuple[str, ...]:
-    """Names of the effects that this process registered."""
     return tuple(_REGISTERED)
 
 
 def stated_effects() -> Mapping[str, Effect]:
-    """What the job at hand states of its own."""
-    return _STATED.get()
+    return _STATED.get()[0]
 
 
 _REGISTERED: dict[str, _Registered] = {}
-_STATED: ContextVar[Mapping[str, Effect]] = ContextVar("effects of the job at hand", default=MappingProxyType({}))
-_ALONE: ContextVar[bool] = ContextVar("whether these are all that its machine has", default=False)
+# effects of the job at hand, and whether these are all that its machine has
+_STATED: ContextVar[tuple[Mapping[str, Effect], bool]] = ContextVar("stated", default=(MappingProxyType({}), False))
 
 
 def _own() -> dict[str, Effect]:
-    return {**{name: plugin.effect for name, plugin in _REGISTERED.items()}, **_STATED.get()}
+    return {**{name: plugin.effect for name, plugin in _REGISTERED.items()}, **stated_effects()}
 
 
 # What is installed follows from where packages are looked for, so that is the key.
 @lru_cache(maxsize=4)
 def _outside(path: tuple[str, ...]) -> Mapping[str, EffectPlugin]:
-    return outside_effects(EVERY)
+    return _offered()
 
 
 @lru_cache(maxsize=4)

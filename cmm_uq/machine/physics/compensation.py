@@ -194,29 +194,25 @@ def offset_plane(
     return OffsetPlane(plane.point - offset * normal, normal, covariance, angle, turned, plane)
 
 
+def _refuse(wrong: NDArray[np.bool_], problem: str, fix: str) -> None:
+    if wrong.any():
+        raise DirectionPointError(int(np.argmax(wrong)), problem, fix)
+
+
 def _cosines(normal: Floats, approach: Floats) -> Floats:
     distance = np.linalg.norm(approach, axis=1)
-    if np.any(nowhere := ~(distance > 0)):
-        raise DirectionPointError(
-            int(np.argmax(nowhere)), "the direction point is the first point of contact",
-            "Measure the direction point again, before the probe touches the surface",
-        )  # fmt: skip
+    problem = "the direction point is the first point of contact"
+    _refuse(~(distance > 0), problem, "Measure the direction point again, before the probe touches the surface")
     return np.asarray(approach @ normal / distance, dtype=np.float64)
 
 
 def _refuse_slanting(angles: Floats, acceptance: float) -> None:
-    if not np.any(slanting := angles > acceptance):
-        return
-    index = int(np.argmax(slanting))
-    if angles[index] >= np.pi - acceptance:
-        raise DirectionPointError(
-            index, "the direction point is rejected: it lies on the other side of the plane than the first one",
-            "Measure the direction points again, all from where the probe comes, and then the points of contact",
-        )  # fmt: skip
-    beside = float(np.degrees(min(angles[index], np.pi - angles[index])))
-    raise DirectionPointError(
-        index,
-        f"the direction point is rejected: it was approached at {beside:.1f}° to the plane's normal, accepted are "
-        f"{np.degrees(acceptance):.1f}°",
-        "Measure the direction point again nearer to the normal, just before contact, and then the points of contact",
-    )
+    slanting = angles > acceptance
+    angle = angles[int(np.argmax(slanting))]
+    beside = float(np.degrees(min(angle, np.pi - angle)))
+    problem = f"it was approached at {beside:.1f}° to the plane's normal, accepted are {np.degrees(acceptance):.1f}°"
+    fix = "Measure the direction point again nearer to the normal, just before contact, and then the points of contact"
+    if angle >= np.pi - acceptance:
+        problem = "it lies on the other side of the plane than the first one"
+        fix = "Measure the direction points again, all from where the probe comes, and then the points of contact"
+    _refuse(slanting, f"the direction point is rejected: {problem}", fix)

@@ -325,8 +325,9 @@ class DigitizedCloud:
         finite = np.isfinite(rows)
         if not finite.all():
             row, column = np.argwhere(~finite)[0]
-            raise CmmUqError(f"{self.columns[column]} is no finite number", where=f"point {row + 1}",
-                             fix="Leave out the point")  # fmt: skip
+            raise CmmUqError(
+                f"{self.columns[column]} is no finite number", where=f"point {row + 1}", fix="Leave out the point"
+            )
         temperatures = self._temperatures(rows)
         if POSE not in self.columns:
             (digitizer,) = self.poses.values()
@@ -372,8 +373,9 @@ def columns_for(header: Sequence[str] | None, poses: int, *, logged: bool, where
         return (*DIGITIZER_COLUMNS, TIME) if logged else DIGITIZER_COLUMNS
     own = [name for name in TEMPERATURES if name in header]
     if own and logged:
-        raise CmmUqError(f"has {own[0]}, and [machine] temperature_log gives it as well", where=where,
-                         fix="Leave out one of the two")  # fmt: skip
+        raise CmmUqError(
+            f"has {own[0]}, and [machine] temperature_log gives it as well", where=where, fix="Leave out one of the two"
+        )
     needed = [*DIGITIZER_COLUMNS, *([POSE] if poses > 1 or POSE in header else []), *([TIME] if logged else [])]
     needed += TEMPERATURES if own else ()
     missing = [name for name in needed if name not in header]

@@ -65,12 +65,15 @@ class ErrorMap:
         return {pair: round(float(s) / ARCSECOND, 9) for pair, s in zip(PAIRS, self.squareness, strict=True)}
 
     def covers(self, machine: Machine) -> None:
-        for axis, carriage in zip(AXES, self.axes, strict=True):
-            low, high = machine.travel_mm[AXES.index(axis)]
+        for axis, carriage, (low, high) in zip(AXES, self.axes, machine.travel_mm, strict=True):
             first, last = carriage.span
             if first > low or last < high:
+                ratio, fix = (last - first) / (high - low), "Map the whole travel, or give the travel that is used"
+                for factor, unit in ((1e-3, "m"), (1e3, "µm"), (1 / 25.4, "inches")):
+                    if abs(ratio / factor - 1) < 0.2:
+                        fix = f"The positions seem to be in {unit}: convert them to mm"
                 problem = f"axis {axis} is mapped from {first:g} to {last:g} mm, the travel is {low:g} to {high:g} mm"
-                raise CmmUqError(problem, where=self.source or None, fix=_travel_advice(last - first, high - low))
+                raise CmmUqError(problem, where=self.source or None, fix=fix)
 
 
 def read_error_map(path: Path, *, temperature: float = 20.0, units_checked: bool = True) -> ErrorMap:
@@ -148,13 +151,6 @@ def check_units(carriages: Sequence[AxisErrors], where: str) -> None:
         problem = f"a rotation of {turned:.3g}″: the map is not in arc seconds"
     if problem is not None:
         raise CmmUqError(problem, where=where, fix="Convert displacements to µm and rotations to arc seconds")
-
-
-def _travel_advice(mapped: float, travel: float) -> str:
-    for factor, unit in ((1e-3, "m"), (1e3, "µm"), (1 / 25.4, "inches")):
-        if abs(mapped / travel / factor - 1) < 0.2:
-            return f"The positions seem to be in {unit}: convert them to mm"
-    return "Map the whole travel, or give the travel that is used"
 
 
 _TABLE = re.compile(r"map data:\s*([xyz])[\s-]*axis", re.IGNORECASE)

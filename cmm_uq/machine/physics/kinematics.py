@@ -220,7 +220,7 @@ def exact(
     """
     chain = KinematicChain.of(chain)
     axes = axis_directions(squareness)
-    own = readings + position_errors(errors)
+    own = readings + errors[:, np.arange(3), np.arange(3)]
     point = np.zeros(np.shape(readings)) if tip is None else np.broadcast_to(tip, np.shape(readings)).copy()
     for place in reversed(range(3)):
         i = chain.order[place]
@@ -252,19 +252,13 @@ def on_leaning_axes(
     for j in (1, 2):  # x does not lean
         own = readings[:, j] + errors[:, j, j]
         moved = [own * lean[..., j, k] for k in range(3)]
-        turning = [i for i in range(3) if j in _carried(i, chain)]
         for k in range(3):
             e[:, k] += moved[k]
-        for i in turning:
+        for i in (i for i in range(3) if j in _carried(i, chain)):
             for k in range(3):
                 e[:, k] += errors[:, i, 3 + (k + 1) % 3] * moved[(k + 2) % 3]
                 e[:, k] -= errors[:, i, 3 + (k + 2) % 3] * moved[(k + 1) % 3]
     return e
-
-
-def position_errors(errors: Floats) -> Floats:
-    """Position error (n, 3) of each carriage, along its own motion, of errors (n, 3, 6)."""
-    return np.asarray(errors[:, np.arange(3), np.arange(3)])
 
 
 def axis_directions(squareness: Floats | None) -> Floats:

@@ -24,25 +24,11 @@ CHUNK = 2**20  # bytes read at a time, some 20 000 lines
 _FIX = "Save the cloud as CSV in UTF-8: a line of names, then one line a point"
 
 
-def csv_header(path: Path) -> tuple[str, ...]:
-    with _opened(path) as file:
-        return _header(file, path)[0]
-
-
-def csv_length(path: Path) -> float:
-    """Roughly how many points there are, from the length of the first lines."""
-    with _opened(path) as file:
-        head = file.read(2**16)
-    return path.stat().st_size * max(head.count(b"\n"), 1) / max(len(head), 1)
-
-
 def csv_blocks(path: Path, columns: Sequence[str], block: int) -> Iterator[Floats]:
     """Rows (b, k) of some columns, b ≤ ``block``; empty lines and those that begin with # are passed over."""
     with _opened(path) as file:
         header, number = _header(file, path)
-        missing = [name for name in columns if name not in header]
-        if missing:
-            raise CmmUqError(f"has no column {missing[0]}", where=str(path), fix=f"A cloud has {', '.join(columns)}")
+        _refuse_missing(columns, header, path)
         places = [header.index(name) for name in columns]
         for lines, first in _lines(file, path, number + 1):
             at = [first + i for i, line in enumerate(lines) if line and line[0] != "#"]
@@ -80,8 +66,8 @@ def _values(lines: list[str], at: list[int], header: Sequence[str], places: Sequ
     width = len(header)
     other = next((i for i, line in enumerate(lines) if line.count(",") != width - 1), None)
     if other is not None:
-        raise CmmUqError(f"has {lines[other].count(',') + 1} cells where the header has {width}",
-                         where=f"{path} line {at[other]}", fix="Complete the row")  # fmt: skip
+        problem = f"has {lines[other].count(',') + 1} cells where the header has {width}"
+        raise CmmUqError(problem, where=f"{path} line {at[other]}", fix="Complete the row")
     cells = ",".join(lines).split(",")
     if any(" " in line or "\t" in line for line in lines):
         cells = [cell.strip() for cell in cells]
@@ -212,7 +198,8 @@ def cloud_header(source: Path) -> tuple[str, ...] | None:
     """Names of the columns of a cloud; ``None`` for arrays, which have none."""
     (first, *_) = cloud_files(source)
     if source.suffix == ".csv":
-        return csv_header(first)
+        with _opened(first) as file:
+            return _header(file, first)[0]
     if source.suffix == ".parquet":
         with _parquet_file(first) as file:
             return tuple(file.schema_arrow.names)
@@ -220,45 +207,40 @@ def cloud_header(source: Path) -> tuple[str, ...] | None:
 
 
 def cloud_length(source: Path) -> float:
-    """How many points a cloud has; of a CSV roughly."""
+    """How many points a cloud has; of a CSV roughly, from the length of its first lines."""
     files = cloud_files(source)
+    size = sum(file.stat().st_size for file in files)
     if source.suffix == ".csv":
-        return csv_length(files[0])
+        with _opened(files[0]) as file:
+            head = file.read(2**16)
+        return size * max(head.count(b"\n"), 1) / max(len(head), 1)
     if source.suffix == ".parquet":
         with _parquet_file(files[0]) as file:
             return float(file.metadata.num_rows)
-    return sum(file.stat().st_size for file in files) / (8.0 * len(DIGITIZER_COLUMNS))
+    return size / (8.0 * len(DIGITIZER_COLUMNS))
 
 
 def _npy_blocks(path: Path, width: int, block: int) -> Iterator[Floats]:
     # read, not mapped: the pages of a mapped file stay in memory as long as there is room
-    try:
-        with path.open("rb") as file:
-            shape, fortran, dtype = _npy_header(file, path)
-            if len(shape) != 2 or shape[1] != width or fortran or dtype.kind != "f":
-                problem = f"holds {dtype} of shape {shape}" + (", column by column" if fortran else "")
-                fix = f"A cloud is rows of {width} floating-point numbers, row by row"
-                raise CmmUqError(problem, where=str(path), fix=fix)
-            left = shape[0]
-            while left:
-                rows = min(left, block)
-                values = np.fromfile(file, dtype=dtype, count=rows * width)
-                if len(values) < rows * width:
-                    raise CmmUqError("ends before its last row", where=str(path), fix="Copy the file again")
-                yield values.reshape(rows, width).astype(np.float64, copy=False)
-                left -= rows
-    except OSError as error:
-        problem = f"cannot be read: {error.strerror}"
-        raise CmmUqError(problem, where=str(path), fix="Check the name of the cloud") from error
-
-
-def _npy_header(file: Any, path: Path) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    try:
-        version = np.lib.format.read_magic(file)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        return read(file)
-    except ValueError as error:
-        raise CmmUqError(f"is no .npy file ({error})", where=str(path), fix="Write it with numpy.save") from None
+    with _opened(path) as file:
+        try:
+            version = np.lib.format.read_magic(file)
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            shape, fortran, dtype = read(file)
+        except ValueError as error:
+            raise CmmUqError(f"is no .npy file ({error})", where=str(path), fix="Write it with numpy.save") from None
+        if len(shape) != 2 or shape[1] != width or fortran or dtype.kind != "f":
+            problem = f"holds {dtype} of shape {shape}" + (", column by column" if fortran else "")
+            fix = f"A cloud is rows of {width} floating-point numbers, row by row"
+            raise CmmUqError(problem, where=str(path), fix=fix)
+        left = shape[0]
+        while left:
+            rows = min(left, block)
+            values = np.fromfile(file, dtype=dtype, count=rows * width)
+            if len(values) < rows * width:
+                raise CmmUqError("ends before its last row", where=str(path), fix="Copy the file again")
+            yield values.reshape(rows, width).astype(np.float64, copy=False)
+            left -= rows
 
 
 @contextlib.contextmanager
@@ -285,11 +267,14 @@ def _written_npy(path: Path, names: Sequence[str], mark: str) -> Iterator[Callab
 
 def _parquet_blocks(path: Path, columns: Sequence[str], block: int) -> Iterator[Floats]:
     with _parquet_file(path) as file:
-        missing = [name for name in columns if name not in file.schema_arrow.names]
-        if missing:
-            raise CmmUqError(f"has no column {missing[0]}", where=str(path), fix=f"A cloud has {', '.join(columns)}")
+        _refuse_missing(columns, file.schema_arrow.names, path)
         for batch in file.iter_batches(batch_size=block, columns=list(columns)):
             yield _numbers([batch.column(name) for name in columns], columns, path)
+
+
+def _refuse_missing(columns: Sequence[str], there: Sequence[str], path: Path) -> None:
+    if missing := [name for name in columns if name not in there]:
+        raise CmmUqError(f"has no column {missing[0]}", where=str(path), fix=f"A cloud has {', '.join(columns)}")
 
 
 def _numbers(cells: Sequence[Any], columns: Sequence[str], path: Path) -> Floats:

@@ -119,7 +119,6 @@ class StatedEffect(Effect):
 
     @property
     def words(self) -> Text:
-        """Formula and parameters, as documents print them."""
         each = [
             say("{name} about 0 ± {prior:g} {unit} beforehand", name=Verbatim(own), prior=one.prior_sd, unit=one.unit)
             for own, one in zip(self._linear, self.coefficients, strict=True)

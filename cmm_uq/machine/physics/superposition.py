@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.base.arm import Arm
 from cmm_uq.base.points import AXES, Floats, Points
@@ -35,7 +36,10 @@ class About:
 
     def columns(self, effect: Effect, shape: Sequence[float] = ()) -> Floats:
         """Change of e, (n, 3, j) in mm, for one unit of each coefficient of one effect, named in the model or not."""
-        basis = _along_motion(effect, effect.basis(self.points, shape), self.points)
+        basis, directions = effect.basis(self.points, shape), self.points.directions
+        if directions is not None and effect.along_motion is not None:  # of an axis that leans
+            axis = AXES.index(effect.along_motion)
+            basis = np.asarray(directions[..., axis, :, None] * basis[:, axis : axis + 1])
         if effect.mechanism == ARTEFACT:
             return self.points.machine.turned(basis, self.points.columns)
         if self.change is None or not effect.plane:
@@ -121,9 +125,10 @@ class Superposition:
         return any(isinstance(effect, OfRows) for effect in self.effects)
 
     @property
-    def _of_rows(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        each = [isinstance(effect, OfRows) for effect in self.effects for _ in effect.coefficients]
-        return np.array(each, dtype=bool)
+    def _of_rows(self) -> NDArray[np.bool_]:
+        return np.array(
+            [isinstance(effect, OfRows) for effect in self.effects for _ in effect.coefficients], dtype=bool
+        )
 
     @property
     def leaning(self) -> list[tuple[int, Effect]]:
@@ -131,17 +136,9 @@ class Superposition:
         return [(int(i), effect) for i, effect in zip(first, self.effects, strict=False) if effect.plane]
 
     @property
-    def leans(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def leans(self) -> NDArray[np.bool_]:
         """(k,) which coefficients are of a squareness."""
         return np.array([bool(effect.plane) for effect in self.effects for _ in effect.coefficients], dtype=bool)
-
-
-def _along_motion(effect: Effect, basis: Floats, points: Points) -> Floats:
-    """What goes along an axis of the coordinates, turned into the motion of that axis where it leans."""
-    if points.directions is None or effect.along_motion is None:
-        return basis
-    axis = AXES.index(effect.along_motion)
-    return np.asarray(points.directions[..., axis, :, None] * basis[:, axis : axis + 1])
 
 
 def _indicated(true: Points, directions: Floats) -> Points:

@@ -12,7 +12,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.digitizer import THREE, DigitizerArtefact
 from cmm_uq.artefacts.plane import PlaneSurface
-from cmm_uq.artefacts.shift.decisions import ShiftedReadings
+from cmm_uq.artefacts.shift.result import ShiftedReadings
 from cmm_uq.artefacts.triangle import Triangle, corners
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty

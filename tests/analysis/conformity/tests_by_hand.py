@@ -13,7 +13,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
-from cmm_uq.artefacts.spheres.kind import TableSpheresFacts
+from cmm_uq.artefacts.kinds import TableSpheresFacts
 from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.artefacts.spheres.table_spheres import TableSpheres
 from cmm_uq.base.points import Floats, Points

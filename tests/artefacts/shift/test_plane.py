@@ -14,6 +14,7 @@ from cmm_uq.artefacts.shift.plane_model import FreeInPlane, free_in_plane, plane
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.machine.physics.compensation import compensate_points, machine_compensation
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.machine.physics.kinematics import exact, first_order
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 from cmm_uq.maths.inference.ensembles import run_ensembles
@@ -165,7 +166,7 @@ def test_turned_by_90_degrees_only_the_common_scale_is_left() -> None:
 def test_a_known_length_gives_the_common_scale() -> None:
     found = free(TURNED, DIAGONAL)
     assert found.combinations == ()
-    assert found.size_known
+    assert found.determines(SCALE)
 
 
 def test_shifted_along_x_alone_an_arc_with_its_yaw_looks_like_turned_placings() -> None:

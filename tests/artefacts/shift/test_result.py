@@ -12,10 +12,10 @@ import pytest
 
 import cmm_uq
 from cmm_uq.artefacts.shift.axis import ShiftResult
-from cmm_uq.artefacts.shift.result import Curve, correction_table, listed_draws, peak_to_valley, table_text
+from cmm_uq.artefacts.shift.result import Curve, correction_table, listed_draws, peak_to_valley
 from cmm_uq.artefacts.shift.smooth import DRAWS
 from cmm_uq.base.points import Floats, Machine
-from cmm_uq.machine.physics.error_map import parse_error_map
+from cmm_uq.machine.physics.error_map import error_map_csv, parse_error_map
 from cmm_uq.maths.inference.ensembles import ENSEMBLES
 from tests.conftest import ROOT
 
@@ -175,7 +175,7 @@ MACHINE = Machine(travel_mm=np.array([[0.0, 900.0], [0.0, 500.0], [np.nan, np.na
 
 
 def test_the_table_is_the_curve_to_a_nanometre_as_displacement_of_its_own_axis() -> None:
-    table = parse_error_map(table_text(correction_table("x", CURVE, MACHINE)), "table.csv")
+    table = parse_error_map(error_map_csv(correction_table("x", CURVE, MACHINE)).encode(), "table.csv")
     x, y, z = table.axes
     inside = (x.positions >= 100) & (x.positions <= 500)
     np.testing.assert_allclose(x.positions[inside], POSITION)

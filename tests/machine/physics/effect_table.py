@@ -91,17 +91,17 @@ def seen_by(effect: Effect, artefact: Artefact) -> bool:
 
 
 def families(names: dict[str, Effect]) -> list[list[Effect]]:
-    """Effects of one class, in order."""
-    found: dict[type[Effect], list[Effect]] = {}
+    """Effects of one class, and of one motion of a table, in order."""
+    found: dict[object, list[Effect]] = {}
     for effect in names.values():
-        found.setdefault(type(effect), []).append(effect)
+        found.setdefault((type(effect), effect.__doc__), []).append(effect)
     return list(found.values())
 
 
 def row(family: list[Effect], artefacts: dict[str, Artefact]) -> str:
     """One line of the table."""
     effect = family[0]
-    summary = (inspect.getdoc(type(effect)) or "").split("\n\n")[0].replace("\n", " ").replace("``", "`").rstrip(".")
+    summary = (inspect.getdoc(effect) or "").split("\n\n")[0].replace("\n", " ").replace("``", "`").rstrip(".")
     parameters = ", ".join(parameter(p) for p in effect.reported)
     columns = ", ".join(f"`{c}`" for c in dict.fromkeys(c for e in family for c in e.columns)) or "–"
     seen = [kind for kind, artefact in artefacts.items() if any(seen_by(e, artefact) for e in family)]

@@ -8,8 +8,7 @@ import pytest
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.physics.catalogue import EVERY
-from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.words import Amount
+from cmm_uq.machine.physics.effect import Amount, Effect
 from tests.recordings import TRAVEL
 
 MACHINE = Machine("m", "XYZ", TRAVEL)

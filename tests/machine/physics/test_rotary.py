@@ -14,8 +14,8 @@ from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.rotary import Turntable
 from cmm_uq.machine.physics.catalogue import EVERY
+from cmm_uq.machine.physics.effect import Amount
 from cmm_uq.machine.physics.superposition import Superposition
-from cmm_uq.machine.physics.words import Amount
 
 ARCSECOND, MICROMETRE = np.pi / 648000, 1e-3
 ORIGIN, PIVOT = np.array([10.0, -20.0, 30.0]), np.array([350.0, 480.0, 55.0])

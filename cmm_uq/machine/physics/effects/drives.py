@@ -15,7 +15,10 @@ from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.machine.physics.effect import (
+    AXIS,
     FURTHER,
+    SIZE,
+    Amount,
     Effect,
     Family,
     Harmonic,
@@ -24,9 +27,10 @@ from cmm_uq.machine.physics.effect import (
     Parameter,
     Shape,
     along,
+    filled,
+    say,
 )
 from cmm_uq.machine.physics.effects.rigid_body import bow, turned
-from cmm_uq.machine.physics.words import AXIS, SIZE, Amount, filled, say
 from cmm_uq.maths.uncertainty.air.state import harris_2004
 
 _MILLISECOND = 1e-3  # 1 ms in s

@@ -23,8 +23,7 @@ from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, ArmPose, D
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
-from cmm_uq.machine.physics.effect import FURTHER, Effect, Family, Harmonic, Parameter, Shape
-from cmm_uq.machine.physics.words import say
+from cmm_uq.machine.physics.effect import FURTHER, Effect, Family, Harmonic, Parameter, Shape, say
 
 
 class OfRows(Effect):
@@ -246,7 +245,6 @@ _REVOLUTE: tuple[Callable[[str], OfJoint], ...] = (Eccentricity, Ovality, GearEr
 
 
 def effects_of_arm(points: Points) -> dict[str, Effect]:
-    """Every effect that the arm of these points can have, by name."""
     arm, found = arm_of(points), list[Effect]()
     for joint, turns in zip(arm.joints, arm.revolute, strict=True):
         found += [kind(joint) for kind in (*_EVERY, *(_REVOLUTE if turns else (Gain,)))]

@@ -111,8 +111,6 @@ _FEWEST = 3  # places that were met in two set-ups, for a pattern
 
 @dataclass(frozen=True, eq=False)
 class FaultyArtefact:
-    """An artefact as its faults know it."""
-
     body: Body  # its places
     points: Points  # as recorded
     size: float  # plausible standard deviation of what a fault does, in the unit of the fault

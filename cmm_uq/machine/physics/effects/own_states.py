@@ -189,20 +189,16 @@ class OwnForm(OwnFault, OfDirections):
 
 
 def harmonics(normals: Floats, turned: Floats | float) -> Floats:
-    """Of directions (n, 3), turned back about Z by angles, rad: all of :data:`HARMONICS`, (n, k)."""
-    azimuth = np.arctan2(normals[:, 1], normals[:, 0]) - turned
+    """Of directions (n, 3), turned back about Z by angles, rad: all of :data:`HARMONICS`, (n, k), of mean square one."""
+    azimuth, found = np.arctan2(normals[:, 1], normals[:, 0]) - turned, []
     polar = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
-    return np.column_stack([_harmonic(degree, order, polar, azimuth) for degree, order in HARMONICS])
-
-
-def _harmonic(degree: int, order: int, polar: Floats, azimuth: Floats) -> Floats:
-    """Real spherical harmonic (n,) of mean square one over the sphere."""
-    k = abs(order)
-    legendre = scipy.special.lpmv(k, degree, np.cos(polar))
-    log_ratio = scipy.special.gammaln(degree - k + 1) - scipy.special.gammaln(degree + k + 1)
-    norm = np.sqrt((2 * degree + 1) * (1 if k == 0 else 2) * np.exp(log_ratio))
-    wave = np.cos(k * azimuth) if order >= 0 else np.sin(k * azimuth)
-    return np.asarray(norm * legendre * wave, dtype=np.float64)
+    for degree, order in HARMONICS:
+        k = abs(order)
+        legendre = scipy.special.lpmv(k, degree, np.cos(polar))
+        log_ratio = scipy.special.gammaln(degree - k + 1) - scipy.special.gammaln(degree + k + 1)
+        norm = np.sqrt((2 * degree + 1) * (1 if k == 0 else 2) * np.exp(log_ratio))
+        found.append(norm * legendre * (np.cos(k * azimuth) if order >= 0 else np.sin(k * azimuth)))
+    return np.column_stack(found)
 
 
 def _about_set_up(points: Points) -> Floats:

@@ -15,12 +15,11 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
-from cmm_uq.machine.physics.effect import FURTHER, Effect, Harmonic, Parameter
+from cmm_uq.machine.physics.effect import FURTHER, Effect, Harmonic, Parameter, say
 from cmm_uq.machine.physics.effects.drives import travel
 from cmm_uq.machine.physics.effects.own_states import HARMONICS, NORMAL, OfDirections, harmonics, lobes_of, normals_of
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
 from cmm_uq.machine.physics.kinematics import euler_313
-from cmm_uq.machine.physics.words import say
 
 TIP = tuple(f"tip_{a}_mm" for a in AXES)
 REFERENCE_LENGTH = 100.0  # mm; the length of stylus that bending is stated for
@@ -142,9 +141,10 @@ class ArtefactSag(Effect):
             return None
         return CmmUqError(
             f"{self.name} shortens a bar or a gauge, and the points of measurement {points.measurement[beside[0]]} do not "
-            "lie on one line", where="job.toml [model] effects",
+            "lie on one line",
+            where="job.toml [model] effects",
             fix="Leave it out; what bends a plate by its own weight is artefact_bending",
-        )  # fmt: skip
+        )
 
 
 def _bar(points: Points, rows: Ints) -> tuple[Floats, Floats]:
@@ -266,8 +266,9 @@ class DigitizerOffset(Effect):
         "sphere again, in every pose"
     )
     coefficients = (
-        Parameter("u_um", unit("µm"), 20.0, say("along u")), Parameter("v_um", unit("µm"), 20.0, say("along v")),
-    )  # fmt: skip
+        Parameter("u_um", unit("µm"), 20.0, say("along u")),
+        Parameter("v_um", unit("µm"), 20.0, say("along v")),
+    )
     columns, tier = ("gamma_deg",), FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:

@@ -13,9 +13,8 @@ import numpy as np
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
-from cmm_uq.machine.physics.effect import Effect, Family, Nonparametric, OfAxis, Parameter, along
+from cmm_uq.machine.physics.effect import AXIS, OTHER, Effect, Family, Nonparametric, OfAxis, Parameter, along, say
 from cmm_uq.machine.physics.kinematics import KinematicChain, carried_offset
-from cmm_uq.machine.physics.words import AXIS, OTHER, say
 
 # of each plane the axis along which a point moves, and the one that leans, by whose reading it moves
 LEANING = MappingProxyType({"xy": ("x", "y"), "yz": ("y", "z"), "zx": ("x", "z")})

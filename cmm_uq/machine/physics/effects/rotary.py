@@ -22,8 +22,19 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.rotary import ROTARY, Turntable
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
-from cmm_uq.machine.physics.effect import FURTHER, CommonSize, Effect, Family, Harmonic, Nonparametric, Parameter
-from cmm_uq.machine.physics.words import AXIS, OTHER, filled, say
+from cmm_uq.machine.physics.effect import (
+    AXIS,
+    FURTHER,
+    OTHER,
+    CommonSize,
+    Effect,
+    Family,
+    Harmonic,
+    Nonparametric,
+    Parameter,
+    filled,
+    say,
+)
 
 _MANY, _HIGHER = "n", np.arange(3, 13)  # orders of errors of which only the common size is known beforehand
 
@@ -112,8 +123,8 @@ class Motion(NamedTuple):
     family: str
     error: Text  # its name, without direction and order
     remedy: Text
-    of_order: str  # formula of one order of the angle
-    of_all: str = ""  # of all higher ones
+    of_order: tuple[str, str]  # in words, and formula, of one order of the angle
+    of_all: tuple[str, str] = ("", "")  # of all higher ones
     across: bool = False  # of its own axis, whether it moves across that
     turns: bool = False
 
@@ -124,7 +135,7 @@ class TableMotion(OfTable):
     def __init__(self, motion: Motion, axis: str, *others: str) -> None:
         own, direction = AXES.index(ROTARY[axis]), others[0]
         self.motion, self.family, self.order = motion, motion.family, others[-1]
-        self.formula = motion.of_all if self.order == _MANY else motion.of_order
+        self.__doc__, self.formula = motion.of_all if self.order == _MANY else motion.of_order
         each = [(own + 1) % 3, (own + 2) % 3] if motion.across else [own]
         self.parts = tuple(i for i in each if direction not in ROTARY.values() or direction == AXES[i])
         super().__init__(axis, *others)
@@ -198,28 +209,33 @@ def _waves(angle: Floats) -> Floats:
     return np.stack([np.cos(each), np.sin(each)], axis=2).reshape(len(angle), -1)
 
 
-# across its axis as it turns: in a circle against its turn (1), or along one axis of the machine
 RADIAL = Motion(
     "rotary_radial", say("Radial error of table {axis}"), say("its bearing runs out: check bearing and preload"),
-    "e = −E; c_1: EXC = A·cos(C + φ), EYC = −A·sin(C + φ); c_x_2: EXC = A·cos(2C + φ)",
-    "e = −E, EXC and EYC = Σ cosine_k·cos(kC) + sine_k·sin(kC)", across=True,
+    ("The table moves across its axis as it turns: in a circle against its turn (1), or along one axis of the machine",
+     "e = −E; c_1: EXC = A·cos(C + φ), EYC = −A·sin(C + φ); c_x_2: EXC = A·cos(2C + φ)"),
+    ("The table moves across its axis as any function of its angle, of the orders 3 to 12",
+     "e = −E, EXC and EYC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"), across=True,
 )  # fmt: skip
 AXIAL = Motion(
     "rotary_axial", say("Axial error of table {axis}"),
     say("its axial bearing runs out: check its races and their seat"),
-    "e = −E; c_2: EZC = A·cos(2C + φ)", "e = −E, EZC = Σ cosine_k·cos(kC) + sine_k·sin(kC)",
+    ("The table moves along its axis as it turns", "e = −E; c_2: EZC = A·cos(2C + φ)"),
+    ("The table moves along its axis as any function of its angle, of the orders 3 to 12",
+     "e = −E, EZC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"),
 )  # fmt: skip
-# in a circle against its turn (1), or about one axis of the machine
 TILT = Motion(
     "rotary_wobble", say("Tilt error of table {axis}"),
     say("it wobbles: check the axial bearing, and how evenly the table is loaded"),
-    "e = −ε × r; c_1: EAC = A·cos(C + φ), EBC = −A·sin(C + φ); c_x_2: EAC = A·cos(2C + φ)", across=True, turns=True,
+    ("The table tilts as it turns: in a circle against its turn (1), or about one axis of the machine",
+     "e = −ε × r; c_1: EAC = A·cos(C + φ), EBC = −A·sin(C + φ); c_x_2: EAC = A·cos(2C + φ)"), across=True, turns=True,
 )  # fmt: skip
-# at another angle than it reads; of the first order as of an encoder beside the axis
 ANGULAR = Motion(
     "rotary_positioning", say("Angular positioning error of table {axis}"),
     say("its encoder is beside its axis (order 1) or out of round: centre it, or compensate its positions"),
-    "e = −ε × r; c_1: ECC = A·cos(C + φ)", "e = −ε × r, ECC = Σ cosine_k·cos(kC) + sine_k·sin(kC)", turns=True,
+    ("The table stands at another angle than it reads; of the first order as of an encoder beside the axis",
+     "e = −ε × r; c_1: ECC = A·cos(C + φ)"),
+    ("The table stands at another angle than it reads, by any function of it, of the orders 3 to 12",
+     "e = −ε × r, ECC = Σ cosine_k·cos(kC) + sine_k·sin(kC)"), turns=True,
 )  # fmt: skip
 
 

@@ -12,9 +12,19 @@ import numpy as np
 
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
-from cmm_uq.machine.physics.effect import FURTHER, Family, Nonparametric, OfAxis, Parameter, Shape, along
+from cmm_uq.machine.physics.effect import (
+    AXIS,
+    FURTHER,
+    OTHER,
+    Family,
+    Nonparametric,
+    OfAxis,
+    Parameter,
+    Shape,
+    along,
+    say,
+)
 from cmm_uq.machine.physics.effects.rigid_body import bow, turned
-from cmm_uq.machine.physics.words import AXIS, OTHER, say
 
 _WEAR = 1 / 12  # of the travel, standard deviation of the place where a guideway is worn
 _TRIED = 19  # places that are tried

@@ -16,9 +16,8 @@ import numpy as np
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
-from cmm_uq.machine.physics.effect import CONTRACT, FURTHER, Effect, Harmonic, OfAxis, Parameter, Shape
+from cmm_uq.machine.physics.effect import AXIS, CONTRACT, FURTHER, Effect, Harmonic, OfAxis, Parameter, Shape, say
 from cmm_uq.machine.physics.effects.rigid_body import LEANING, Lean, turned
-from cmm_uq.machine.physics.words import AXIS, say
 
 # coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible.
 EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6, say("expansion"))
@@ -89,9 +88,8 @@ class ArtefactLag(Expanding):
     tier = FURTHER
 
     def excess(self, points: Points, shape: Sequence[float]) -> Floats:
-        (lag,) = shape
         temperature = points.column("temp_artefact_c")
-        return lagging(points.hours, temperature, lag) - temperature
+        return lagging(points.hours, temperature, shape[0]) - temperature
 
 
 def lagging(hours: Floats, temperature: Floats, lag: float) -> Floats:
@@ -124,9 +122,8 @@ class ThermalLag(OfAxis):
     tier = FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        (lag,) = shape
         temperature = points.column(f"temp_{self.axis}_c")
-        return (lagging(points.hours, temperature, lag) - temperature) * points.readings[self.axis]
+        return (lagging(points.hours, temperature, shape[0]) - temperature) * points.readings[self.axis]
 
 
 class Daily(OfAxis, Harmonic):
@@ -257,8 +254,7 @@ class Settling(OfAxis):
     tier = FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        (settling,) = shape
-        return MICROMETRE * -np.expm1(-points.hours / settling)
+        return MICROMETRE * -np.expm1(-points.hours / shape[0])
 
 
 class ScaleSettling(OfAxis):
@@ -277,8 +273,7 @@ class ScaleSettling(OfAxis):
     tier = FURTHER
 
     def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        (settling,) = shape
-        return PPM * -np.expm1(-points.hours / settling) * points.readings[self.axis]
+        return PPM * -np.expm1(-points.hours / shape[0]) * points.readings[self.axis]
 
 
 SCALE_EXPANSION = MappingProxyType({a: ThermalScale(a) for a in AXES})  # by axis
