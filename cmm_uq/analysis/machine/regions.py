@@ -44,7 +44,7 @@ from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.readings import AxisReading
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.effects.drives import Hysteresis, PeriodicScale
+from cmm_uq.machine.physics.effects.drives import HYSTERESIS, PeriodicScale
 from cmm_uq.machine.physics.superposition import About
 from cmm_uq.maths.inference.families import BRIEF, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
@@ -70,7 +70,7 @@ def with_readings(others: Iterable[Unmodelled], machine: Machine) -> tuple[Unmod
         elif reading is not None:
             if isinstance(effect, PeriodicScale):
                 one = stated_as(one, as_read(effect, reading.largest_um, reading.errors))
-            elif isinstance(effect, Hysteresis) and reading.play_um is not None:
+            elif HYSTERESIS.has(effect) and reading.play_um is not None:
                 one = stated_as(one, as_read(effect, reading.play_um))
         found.append(one)
     return tuple(found)

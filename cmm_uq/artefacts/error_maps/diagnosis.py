@@ -23,7 +23,7 @@ from cmm_uq.certificate.document import Section, figure_columns, section, table
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.predicted_errors import WHERE, maps_of
 from cmm_uq.machine.physics.catalogue import effects as effects_named
-from cmm_uq.machine.physics.effects.thermal import ThermalScale
+from cmm_uq.machine.physics.effects.thermal import THERMAL_SCALE
 from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.uncertainty.quantity import Quantity
@@ -192,7 +192,7 @@ def compared_maps(job: Job) -> tuple[tuple[ErrorMap, ...], list[MapColumn], list
         raise CmmUqError("one error map has nothing to be compared with", where=WHERE,
                          fix="Name two or more maps of the machine; with three it shows which of them differs")  # fmt: skip
     for effect in effects_named(job.facts.model.effects, where="job.toml [model] effects"):
-        if effect.columns and not isinstance(effect, ThermalScale):
+        if effect.columns and not THERMAL_SCALE.has(effect):
             raise CmmUqError(f"{effect.name} needs {', '.join(effect.columns)}, which error maps do not have",
                              where="job.toml [model] effects", fix="Leave it out")  # fmt: skip
     if job.facts.conformity:

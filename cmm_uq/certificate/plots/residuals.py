@@ -220,16 +220,14 @@ def readings_plot(
     result: Result, off_um: Floats, *, reference: Text, from_reference: Text, caption: Text, scale: Floats | float = 1.0
 ) -> Plot:
     """Readings (n,) against a reference, µm, by measurement; ``scale`` of their U."""
-    what = say("{count} readings: as recorded they deviate", count=len(off_um))
     return deviations_plot(
-        result, off_um, what, from_reference, expanded_um=result.noise.expanded * scale, reference=reference,
-        position_label=say("Measurement"), caption=caption,
+        result, off_um, say("{count} readings: as recorded they deviate", count=len(off_um)), from_reference,
+        expanded_um=result.noise.expanded * scale, reference=reference, position_label=say("Measurement"), caption=caption,
     )  # fmt: skip
 
 
 def positioning_plot(
-    targets: ArrayLike, mean: Floats, s: Floats, arrows: str, unit: Text, *, label: Text, caption: Text,
-    alternative: Text,
+    targets: ArrayLike, mean: Floats, s: Floats, arrows: str, unit: Text, *, label: Text, caption: Text, alternative: Text
 ) -> Plot:  # fmt: skip
     """Mean deviations ``mean`` (d, t) at targets (t,) of each direction, with two standard deviations ``s`` (d, t)."""
     across = style.finite("target", targets, (None,))

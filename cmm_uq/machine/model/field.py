@@ -32,8 +32,8 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.machine.physics.effect import Effect, Family, Parameter, along
-from cmm_uq.machine.physics.effects.drives import Hysteresis, PeriodicScale, ScaleCurvature
-from cmm_uq.machine.physics.effects.rigid_body import Rotation, Straightness, turned
+from cmm_uq.machine.physics.effects.drives import HYSTERESIS, SCALE_CURVATURE, PeriodicScale
+from cmm_uq.machine.physics.effects.rigid_body import ROTATIONS, STRAIGHTNESSES, turned
 
 PERIODIC, PLAY, POSITION, STRAIGHTNESS, ROTATION = "periodic", "play", "position", "straightness", "rotation"
 _LONG, _SHORT, STATED = " long", " short", " as stated"
@@ -64,15 +64,10 @@ def family_of(effect: Effect) -> str | None:
         return effect.family
     if effect.of_family or effect.stated:
         return effect.of_family
-    kinds: dict[type[Effect], str] = {
-        PeriodicScale: PERIODIC,
-        GivenPeriod: PERIODIC,
-        Hysteresis: PLAY,
-        ScaleCurvature: POSITION,
-        Straightness: STRAIGHTNESS,
-        Rotation: ROTATION,
-    }
-    return next((name for kind, name in kinds.items() if isinstance(effect, kind)), None)
+    if isinstance(effect, PeriodicScale | GivenPeriod):
+        return PERIODIC
+    rows = {PLAY: HYSTERESIS, POSITION: SCALE_CURVATURE, STRAIGHTNESS: STRAIGHTNESSES, ROTATION: ROTATIONS}
+    return next((name for name, row in rows.items() if row.has(effect)), None)
 
 
 class AxisFunction(Effect):
@@ -102,10 +97,10 @@ class AxisFunction(Effect):
         angle, t = np.pi * (place + _BEYOND) / (1 + 2 * _BEYOND), 2 * place[:, None] - 1
         simple = np.hstack([np.sqrt(1.25) * (3 * t**2 - 1), np.sqrt(3.0) * t])[:, : self.forms]
         each = np.hstack([simple, np.sqrt(2.0) * np.cos(angle[:, None] * self.orders)])
-        if isinstance(self.of, Rotation):
+        if self.kind == ROTATION:
             lever = turned(points, axis, self.of.other, np.ones(len(points)))
             return np.asarray(lever * (ARCSECOND * each)[:, None, :])
-        return along(self.of.other if isinstance(self.of, Straightness) else axis, MICROMETRE * each)
+        return along(self.of.other, MICROMETRE * each)
 
 
 def bounded(effect: Effect, largest_um: float) -> Effect:

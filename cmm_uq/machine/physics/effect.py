@@ -65,7 +65,7 @@ ARTEFACT = "artefact"
 CONTRACT, FURTHER, OWN = "contract", "further", "own"
 # how readily an effect of a tier is thought of: a judgement of how many machines show it
 PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
-TRIALS = 7  # values of a nonlinear parameter
+TRIALS, EVEN = 7, 19  # values of a nonlinear parameter, and of one that is uniform itself
 
 
 @dataclass(frozen=True)
@@ -178,8 +178,9 @@ class Effect(ABC):
         return points.readings[over] if over in points.readings else points.column(over)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
-        """Values of the shape worth trying, evenly spread in their logarithm; one empty tuple without a shape."""
-        yield from product(*(np.geomspace(s.low, s.high, TRIALS).tolist() for s in self.shape))
+        """Values of the shape worth trying, evenly spread in their logarithm, or themselves; an empty tuple without one."""
+        each = (np.linspace(s.low, s.high, EVEN) if s.even else np.geomspace(s.low, s.high, TRIALS) for s in self.shape)
+        yield from product(*(values.tolist() for values in each))
 
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
@@ -219,9 +220,9 @@ class Family(Effect):
 
     family: str  # first part of the name
 
-    def __init__(self, axis: str, *others: str) -> None:
+    def __init__(self, axis: str = "", *others: str) -> None:
         self.axis, self.other = axis, others[0] if others else axis
-        self.name = "_".join((self.family, axis, *others))
+        self.name = "_".join(filter(None, (self.family, axis, *others)))
 
         def lettered(text: str) -> str:
             return text.format(a=axis, b=self.other)

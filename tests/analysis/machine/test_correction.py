@@ -17,6 +17,7 @@ from cmm_uq.base.points import Machine
 from cmm_uq.machine.model.field import curves
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.compensation import NOMINAL, Compensation, PointConditions
+from cmm_uq.machine.physics.effect import along
 from cmm_uq.machine.physics.error_map import ErrorMap
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps, MapCovariance
 from cmm_uq.machine.physics.superposition import Superposition
@@ -73,12 +74,12 @@ def test_a_map_moves_points_by_what_the_errors_themselves_do(
 
 
 def test_an_error_that_depends_on_two_carriages_stands_in_no_map() -> None:
-    class Both(type(effects(["scale_x"])[0])):  # type: ignore[misc]
-        def component(self, points, shape):  # type: ignore[no-untyped-def]
-            return points.readings["x"] * points.readings["y"] * 1e-9
-
+    both = copy(effects(["scale_x"])[0])
+    both.basis = lambda points, shape=(): along(  # type: ignore[method-assign]
+        "x", points.readings["x"] * points.readings["y"] * 1e-9
+    )
     machine = Machine(travel_mm=TRAVEL)
-    assert room._figures(Both("x"), machine, room._blank([tuple(each) for each in TRAVEL.tolist()], 20.0)) is None
+    assert room._figures(both, machine, room._blank([tuple(each) for each in TRAVEL.tolist()], 20.0)) is None
 
 
 @pytest.mark.parametrize("chain", ["XYZ", "YXZ", "XFYZ"])

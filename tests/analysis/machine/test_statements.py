@@ -18,7 +18,7 @@ from cmm_uq.base.points import Machine
 from cmm_uq.jobs.tables.machine import AxisFacts
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.field import PERIODIC, family_of
-from cmm_uq.machine.physics.effects.drives import Hysteresis
+from cmm_uq.machine.physics.effects.drives import HYSTERESIS
 
 SIGMA = 0.7e-3
 GRATING = AxisFacts(names=["x", "y", "z"], reading="exposed optical grating", source="data sheet", period_mm=0.02,
@@ -143,7 +143,7 @@ def test_the_evidence_against_a_bound_is_that_of_the_normal_distribution() -> No
     estimate = model.estimate()
     linear = estimate.linear
     basis = null_space(linear.freedoms.dense().T)
-    play = model.seen(model.columns(Hysteresis("x"), (), estimate.about), estimate.about)
+    play = model.seen(model.columns(HYSTERESIS.of("x"), (), estimate.about), estimate.about)
     mean = np.array([unknown.prior_mean for unknown in linear.unknowns])
     left = basis.T @ (linear.observed - linear.design @ mean)
     design = linear.design * [unknown.prior_sd for unknown in linear.unknowns]

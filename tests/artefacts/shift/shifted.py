@@ -40,7 +40,15 @@ def integrated_by_monte_carlo(
     known: integration.KnownSpan | None = None, trials: int = 100_000, seed: int = 0,
 ) -> integration.IntegratedCurve:  # fmt: skip
     """The curve by propagating distributions (JCGM 102:2011, 7): mean and covariance of Gaussian trials."""
-    inputs, sd = integration._inputs(a, b, u, shift, u_shift, known)
-    drawn = inputs + sd * np.random.default_rng(seed).standard_normal((trials, len(inputs)))
-    errors = integration._error(drawn, len(a), method, shift, known)
+    given = [*([] if shift is None else [(shift, u_shift)]), *([] if known is None else [(known.length, known.u)])]
+    more, sd = np.array(given, dtype=np.float64).reshape(-1, 2).T
+    random, n = np.random.default_rng(seed), len(a)
+    drawn = np.concatenate([a, b, more]) + np.concatenate([*u, sd]) * random.standard_normal(
+        (trials, 2 * n + len(more))
+    )
+    first, second = drawn[:, :n], drawn[:, n : 2 * n]
+    curve = integration.calibration_curve(first, second, None if shift is None else drawn[:, 2 * n], method)
+    if known is not None:
+        curve = integration.with_known_length(curve, known.first, known.last, drawn[:, -1])
+    errors = integration.position_error(first, curve)
     return integration.IntegratedCurve(a, errors.mean(axis=0), np.cov(errors, rowvar=False))

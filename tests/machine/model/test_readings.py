@@ -11,7 +11,7 @@ from scipy.special import sici
 from cmm_uq.jobs.tables.machine import AxisFacts, Reading
 from cmm_uq.machine.model.field import GivenPeriod, allowed, as_read, covariance, family_of
 from cmm_uq.machine.model.readings import HYSTERESIS_UM, PUBLISHED, SCREWS, AxisReading, largest_amplitude
-from cmm_uq.machine.physics.effects.drives import Hysteresis, PeriodicScale
+from cmm_uq.machine.physics.effects.drives import HYSTERESIS, PeriodicScale
 
 MOST = 24.47747  # µm, of an amplitude of normal sine and cosine of 10 µm: 95 of 100 are smaller
 
@@ -129,7 +129,7 @@ def test_of_what_nothing_is_stated_everything_is_as_it_was() -> None:
 def test_stated_errors_are_families_of_their_own_whose_size_is_over_what_is_stated() -> None:
     assert family_of(stated()) == "periodic as stated"
     assert family_of(GivenPeriod(stated(), np.zeros(0), np.zeros((0, 0)))) == "periodic as stated"
-    assert family_of(as_read(Hysteresis("x"), 2.0)) == "play as stated"
-    assert as_read(Hysteresis("x"), 2.0).coefficients[0].prior_sd == pytest.approx(2.0 / 1.959964)
+    assert family_of(as_read(HYSTERESIS.of("x"), 2.0)) == "play as stated"
+    assert as_read(HYSTERESIS.of("x"), 2.0).coefficients[0].prior_sd == pytest.approx(2.0 / 1.959964)
     assert allowed("play as stated") == (1.0, "1")
     assert family_of(PeriodicScale("x")) == "periodic"

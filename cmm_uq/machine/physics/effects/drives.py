@@ -20,7 +20,6 @@ from cmm_uq.machine.physics.effect import (
     SIZE,
     Amount,
     Effect,
-    Family,
     Harmonic,
     Nonparametric,
     OfAxis,
@@ -30,6 +29,7 @@ from cmm_uq.machine.physics.effect import (
     filled,
     say,
 )
+from cmm_uq.machine.physics.effects import Law
 from cmm_uq.machine.physics.effects.rigid_body import bow, turned
 from cmm_uq.maths.uncertainty.air.state import harris_2004
 
@@ -68,184 +68,11 @@ class PeriodicScale(OfAxis, Harmonic):
         return MICROMETRE * np.column_stack([np.sin(angle), np.cos(angle)])
 
 
-class Hysteresis(OfAxis):
-    """Different readings from either side."""
-
-    family, title = "hysteresis", say("Hysteresis of {axis}")
-    formula, mechanism = "e_a = ½·gap·approach_a", "drive"
-    points_to = say("backlash or friction in this drive: the reading depends on the side it is reached from")
-    means = say(
-        "at the same reading {axis} stands {size} further towards {side} when it comes from minus than when it comes from "
-        "plus"
-    )
-    coefficients = (Parameter("gap_um", unit("µm"), 30.0),)
-    columns, idealised_over, imitated_by = ("approach_{a}",), "{a}", (Nonparametric("approach_{a}"),)
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return 0.5 * MICROMETRE * points.column(f"approach_{self.axis}")
-
-
-class Drift(OfAxis):
-    """Drift of an axis with time."""
-
-    family, title = "drift", say("Drift of {axis} with time")
-    formula, mechanism = "e_a = v · time", "temperature"
-    points_to = say("the axis drifts with time: warm-up, or the room's temperature")
-    means = say("at the same reading {axis} moves towards {side} by {size}")
-    coefficients = (Parameter("um_per_h", unit("µm/h"), 10.0),)
-    columns, idealised_over = ("time_s",), "time_s"
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return MICROMETRE * points.hours
-
-
-class Play(Family):
-    """Lateral play: carriage a steps sideways along b when it turns round.
-
-    Worn or badly set bearings of the guideway. Along its own direction the same is hysteresis.
-    """
-
-    family, title = "play", say("Lateral play of {axis} along {direction}")
-    formula, mechanism = "e_b = ½·gap·approach_a", "guideway"
-    points_to = say(
-        "play across the guideway of {axis}: check wear, preload and air gap of the bearings that hold the carriage along "
-        "{direction}"
-    )
-    means = say(
-        "at the same reading the probe stands {size} further towards {side} {direction} when {axis} comes from minus than "
-        "when it comes from plus"
-    )
-    coefficients = (Parameter("gap_um", unit("µm"), 10.0),)
-    columns, tier = ("approach_{a}",), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.other, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
-
-
-class YawPlay(Family):
-    """Carriage a yaws when it turns round, and moves the ram by what it carries.
-
-    A bridge that is driven at one leg, or a drive that is not in line with friction and mass.
-    """
-
-    family, title = "yaw_play", say("Yaw of carriage {axis} at reversal")
-    formula, mechanism = "e = ε × what carriage a carries, ε_z = ½·angle·approach_a", "guideway"
-    points_to = say(
-        "carriage {axis} yaws when it turns round: check the side bearings of its guideway, and where its drive takes hold "
-        "beside its middle"
-    )
-    coefficients = (Parameter("angle_arcsec", unit("″"), 2.0),)
-    columns, tier = ("approach_{a}",), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return turned(points, self.axis, "z", 0.5 * ARCSECOND * points.column(f"approach_{self.axis}"))
-
-
-class WindUp(OfAxis):
-    """Hysteresis that grows along the travel.
-
-    A leadscrew or belt that winds up between motor and carriage, or is worn at one end ("unequal backlash").
-    """
-
-    family, title = "windup", say("Wind-up of the drive of {axis}")
-    formula, mechanism = "e_a = ½·w·approach_a·(a − middle of the travel)", "drive"
-    points_to = say(
-        "the drive of {axis} winds up, or is worn more at one end of the travel: check leadscrew, belt or rack, its tension "
-        "and its end bearings"
-    )
-    coefficients = (Parameter("um_per_m", unit("µm/m"), 20.0),)
-    columns, tier = ("approach_{a}",), FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        low, high = points.machine.travel(self.axis)
-        place = (points.readings[self.axis] - 0.5 * (low + high)) / METRE
-        return 0.5 * MICROMETRE * points.column(f"approach_{self.axis}") * place
-
-
-class SpeedLag(OfAxis):
-    """Scale and trigger read at different moments.
-
-    A positive lag: the scale was read before the probe was where it triggered. Speed along a is the recorded speed times
-    the direction of travel.
-    """
-
-    family, title = "speed_lag", say("Lag of {axis} in proportion to speed")
-    formula, mechanism = "e_a = lag·speed along a, in the sense of travel", "controller"
-    points_to = say(
-        "the scale of {axis} and the trigger are read at different moments: check how the controller latches this scale, and "
-        "probe more slowly until then"
-    )
-    coefficients = (Parameter("lag_ms", unit("ms"), 1.0),)
-    columns, tier = ("speed_mm_s", *(f"approach_{a}" for a in AXES)), FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return _MILLISECOND * points.column("speed_mm_s") * travel(points)[:, AXES.index(self.axis)]
-
-
 def travel(points: Points) -> Floats:
     """Unit vectors (n, 3) of travel into each point; zero where none was recorded."""
     signs = np.column_stack([points.column(f"approach_{a}") for a in AXES])
     length = np.linalg.norm(signs, axis=1, keepdims=True)
     return np.asarray(signs / np.where(length > 0, length, 1.0), dtype=np.float64)
-
-
-class ScaleCurvature(OfAxis):
-    """Position error of second order, over the travel T from a0.
-
-    A scale clamped at both ends, a tape that is stretched unevenly, a rack of two pieces.
-    """
-
-    family, title = "scale_curvature", say("Curvature of the scale of {axis}")
-    formula, mechanism = "e_a = bow·(1 − (2(a − a0)/T − 1)²)", "scale"
-    points_to = say(
-        "the scale of {axis} is stretched unevenly: check how its ends are clamped and its joints, and compensate position by "
-        "a table, which one factor cannot replace"
-    )
-    means = say("in the middle of its travel {axis} stands {size} further towards {side} than it reads")
-    coefficients = (Parameter("bow_um", unit("µm"), 10.0),)
-    tier = FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return MICROMETRE * bow(points, self.axis)
-
-
-class AirScale(OfAxis):
-    """A laser scale whose wavelength is not corrected for air; n₀ at 20 °C, 1013.25 hPa, 50 %.
-
-    Part 1 is no correction at all. About −1 ppm/K, +0.27 ppm/hPa, −0.01 ppm/% in n (Harris 2004 section 3.3).
-    """
-
-    family, title = "air_scale", say("Refractive index of air on the laser scale of {axis}")
-    formula, mechanism = "e_a = −part·(n − n₀)·a", "scale"
-    points_to = say(
-        "the laser of {axis} is not, or wrongly, corrected for air: check its sensors of air temperature, pressure and "
-        "humidity, and that the compensation uses them"
-    )
-    coefficients = (Parameter("part", unit("1"), 1.0),)
-    columns, tier = AIR, FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return -index_change(points) * points.readings[self.axis]
-
-
-class DeadPath(OfAxis):
-    """Dead path of a laser scale: the path d that the zero of the scale leaves out.
-
-    The air between interferometer and zero changes its optical length while nothing moves.
-    """
-
-    family, title = "dead_path", say("Dead path of the laser scale of {axis}")
-    formula, mechanism = "e_a = −d·(n − n at the first point)", "scale"
-    points_to = say(
-        "the dead path of the laser of {axis} is not compensated: enter it in the compensation, or zero the axis close to the "
-        "interferometer"
-    )
-    coefficients = (Parameter("path_mm", unit("mm"), 300.0),)
-    columns, tier = AIR, FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        change = index_change(points)
-        return np.asarray(change[0] - change)
 
 
 def index_change(points: Points) -> Floats:
@@ -255,12 +82,83 @@ def index_change(points: Points) -> Floats:
     return np.asarray(recorded - harris_2004(*_STANDARD), dtype=np.float64)
 
 
-CURVATURE = tuple(ScaleCurvature(a) for a in AXES)
+def _winding(points: Points, axis: str, _: str, __: Sequence[float]) -> Floats:
+    low, high = points.machine.travel(axis)
+    place = (points.readings[axis] - 0.5 * (low + high)) / METRE
+    return along(axis, 0.5 * MICROMETRE * points.column(f"approach_{axis}") * place)
+
+
+def _lagging(points: Points, axis: str, _: str, __: Sequence[float]) -> Floats:
+    return along(axis, _MILLISECOND * points.column("speed_mm_s") * travel(points)[:, AXES.index(axis)])
+
+
+def _path(points: Points, axis: str, _: str, __: Sequence[float]) -> Floats:
+    change = index_change(points)
+    return along(axis, change[0] - change)
+
+
+_APPROACH = ("approach_{a}",)
+HYSTERESIS, DRIFT, PLAY, YAW_PLAY, WIND_UP, SPEED_LAG, SCALE_CURVATURE, AIR_SCALE, DEAD_PATH = (
+    Law("hysteresis", "Different readings from either side", say("Hysteresis of {axis}"), "e_a = ½·gap·approach_a", "drive",
+        say("backlash or friction in this drive: the reading depends on the side it is reached from"),
+        (Parameter("gap_um", unit("µm"), 30.0),),
+        lambda p, a, b, s: along(a, 0.5 * MICROMETRE * p.column(f"approach_{a}")), _APPROACH,
+        means=say("at the same reading {axis} stands {size} further towards {side} when it comes from minus than when it "
+                  "comes from plus"),
+        along_motion=True, idealised_over="{a}", imitated_by=(Nonparametric("approach_{a}"),)),
+    Law("drift", "Drift of an axis with time", say("Drift of {axis} with time"), "e_a = v · time", "temperature",
+        say("the axis drifts with time: warm-up, or the room's temperature"), (Parameter("um_per_h", unit("µm/h"), 10.0),),
+        lambda p, a, b, s: along(a, MICROMETRE * p.hours), ("time_s",), along_motion=True, idealised_over="time_s",
+        means=say("at the same reading {axis} moves towards {side} by {size}")),
+    # worn or badly set bearings of the guideway; along its own direction the same is hysteresis
+    Law("play", "Lateral play: carriage a steps sideways along b when it turns round",
+        say("Lateral play of {axis} along {direction}"), "e_b = ½·gap·approach_a", "guideway",
+        say("play across the guideway of {axis}: check wear, preload and air gap of the bearings that hold the carriage "
+            "along {direction}"), (Parameter("gap_um", unit("µm"), 10.0),),
+        lambda p, a, b, s: along(b, 0.5 * MICROMETRE * p.column(f"approach_{a}")), _APPROACH, FURTHER,
+        means=say("at the same reading the probe stands {size} further towards {side} {direction} when {axis} comes from "
+                  "minus than when it comes from plus")),
+    # a bridge that is driven at one leg, or a drive that is not in line with friction and mass
+    Law("yaw_play", "Carriage a yaws when it turns round, and moves the ram by what it carries",
+        say("Yaw of carriage {axis} at reversal"), "e = ε × what carriage a carries, ε_z = ½·angle·approach_a", "guideway",
+        say("carriage {axis} yaws when it turns round: check the side bearings of its guideway, and where its drive takes "
+            "hold beside its middle"), (Parameter("angle_arcsec", unit("″"), 2.0),),
+        lambda p, a, b, s: turned(p, a, "z", 0.5 * ARCSECOND * p.column(f"approach_{a}")), _APPROACH, FURTHER),
+    # a leadscrew or belt that winds up between motor and carriage, or is worn at one end ("unequal backlash")
+    Law("windup", "Hysteresis that grows along the travel", say("Wind-up of the drive of {axis}"),
+        "e_a = ½·w·approach_a·(a − middle of the travel)", "drive",
+        say("the drive of {axis} winds up, or is worn more at one end of the travel: check leadscrew, belt or rack, its "
+            "tension and its end bearings"), (Parameter("um_per_m", unit("µm/m"), 20.0),), _winding, _APPROACH, FURTHER,
+        along_motion=True),
+    # a positive lag: the scale was read before the probe was where it triggered; speed along a is the recorded speed times
+    # the direction of travel
+    Law("speed_lag", "Scale and trigger read at different moments", say("Lag of {axis} in proportion to speed"),
+        "e_a = lag·speed along a, in the sense of travel", "controller",
+        say("the scale of {axis} and the trigger are read at different moments: check how the controller latches this scale, "
+            "and probe more slowly until then"), (Parameter("lag_ms", unit("ms"), 1.0),), _lagging,
+        ("speed_mm_s", *(f"approach_{a}" for a in AXES)), FURTHER, along_motion=True),
+    # a scale clamped at both ends, a tape that is stretched unevenly, a rack of two pieces
+    Law("scale_curvature", "Position error of second order, over the travel T from a0",
+        say("Curvature of the scale of {axis}"), "e_a = bow·(1 − (2(a − a0)/T − 1)²)", "scale",
+        say("the scale of {axis} is stretched unevenly: check how its ends are clamped and its joints, and compensate "
+            "position by a table, which one factor cannot replace"), (Parameter("bow_um", unit("µm"), 10.0),),
+        lambda p, a, b, s: along(a, MICROMETRE * bow(p, a)), tier=FURTHER, along_motion=True,
+        means=say("in the middle of its travel {axis} stands {size} further towards {side} than it reads")),
+    # part 1 is no correction at all; about −1 ppm/K, +0.27 ppm/hPa, −0.01 ppm/% in n (Harris 2004 section 3.3)
+    Law("air_scale", "A laser scale whose wavelength is not corrected for air; n₀ at 20 °C, 1013.25 hPa, 50 %",
+        say("Refractive index of air on the laser scale of {axis}"), "e_a = −part·(n − n₀)·a", "scale",
+        say("the laser of {axis} is not, or wrongly, corrected for air: check its sensors of air temperature, pressure and "
+            "humidity, and that the compensation uses them"), (Parameter("part", unit("1"), 1.0),),
+        lambda p, a, b, s: along(a, -index_change(p) * p.readings[a]), AIR, FURTHER, along_motion=True),
+    # the air between interferometer and zero changes its optical length while nothing moves
+    Law("dead_path", "Dead path of a laser scale: the path d that the zero of the scale leaves out",
+        say("Dead path of the laser scale of {axis}"), "e_a = −d·(n − n at the first point)", "scale",
+        say("the dead path of the laser of {axis} is not compensated: enter it in the compensation, or zero the axis close "
+            "to the interferometer"), (Parameter("path_mm", unit("mm"), 300.0),), _path, AIR, FURTHER, along_motion=True),
+)  # fmt: skip
+CURVATURE = SCALE_CURVATURE.each(AXES)
 EFFECTS: tuple[Effect, ...] = (
-    *(family(a) for family in (PeriodicScale, Hysteresis, Drift) for a in AXES),
-    *(Play(a, b) for a in AXES for b in AXES if a != b),
-    *(YawPlay(a) for a in "xy"),
-    *(family(a) for family in (WindUp, SpeedLag) for a in AXES),
-    *CURVATURE,
-    *(family(a) for family in (AirScale, DeadPath) for a in AXES),
-)
+    *(PeriodicScale(a) for a in AXES), *HYSTERESIS.each(AXES), *DRIFT.each(AXES),
+    *PLAY.each(f"{a} {b}" for a in AXES for b in AXES if a != b), *YAW_PLAY.each("xy"), *WIND_UP.each(AXES),
+    *SPEED_LAG.each(AXES), *CURVATURE, *AIR_SCALE.each(AXES), *DEAD_PATH.each(AXES),
+)  # fmt: skip

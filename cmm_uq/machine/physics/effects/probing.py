@@ -16,6 +16,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.machine.physics.effect import FURTHER, Effect, Harmonic, Parameter, say
+from cmm_uq.machine.physics.effects import Law
 from cmm_uq.machine.physics.effects.drives import travel
 from cmm_uq.machine.physics.effects.own_states import HARMONICS, NORMAL, OfDirections, harmonics, lobes_of, normals_of
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
@@ -24,21 +25,6 @@ from cmm_uq.machine.physics.kinematics import euler_313
 TIP = tuple(f"tip_{a}_mm" for a in AXES)
 REFERENCE_LENGTH = 100.0  # mm; the length of stylus that bending is stated for
 _MILLISECOND = 1e-3
-
-
-class ProbeRadius(Effect):
-    """Error of the effective stylus radius."""
-
-    name, title = "probe_radius", say("Effective stylus radius")
-    formula, mechanism = "true surface point = indicated + r·n", "probe"
-    points_to = say("the effective stylus radius is wrong: qualify the probe again")
-    means = say("probed surfaces are indicated {size} too {wrong}")
-    sense = (say("deep, inside the material"), say("early, outside the material"))
-    coefficients = (Parameter("um", unit("µm"), 10.0),)
-    columns = NORMAL
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return MICROMETRE * normals_of(points)[:, :, None]
 
 
 class ProbeLobing(Harmonic):
@@ -86,25 +72,6 @@ class ProbeMap(OfDirections):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         normals = normals_of(points)
         return np.asarray(MICROMETRE * normals[:, :, None] * harmonics(normals, 0.0)[:, None, :], dtype=np.float64)
-
-
-class HeadAlignment(Effect):
-    """A probe head that stands turned against where its styli were qualified, and moves each as it is long (ISO 10360-5)."""
-
-    name, title = "head_alignment", say("Alignment of the probe head")
-    formula, mechanism = "e = ω × stylus", "probe"
-    points_to = say(
-        "the probe head, or its stylus changer, stands turned against how the styli were qualified: clean its seats, and "
-        "qualify every stylus again"
-    )
-    coefficients = tuple(
-        Parameter(f"about_{a}_arcsec", unit("″"), 20.0, say("about {axis}", axis=Verbatim(a.upper()))) for a in AXES
-    )
-    columns, tier = TIP, FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        turns = np.cross(np.eye(3)[None], np.column_stack([points.column(name) for name in TIP])[:, None])
-        return np.asarray(ARCSECOND * turns.swapaxes(1, 2), dtype=np.float64)
 
 
 # of its length, by which points of a bar or a gauge may lie beside the line from its first to its farthest
@@ -166,153 +133,12 @@ def _on_line(bar: Floats, about: Floats) -> bool:
     return bool(np.linalg.norm(about - along, axis=1).max() <= _OFF_LINE * np.linalg.norm(bar))
 
 
-class PreTravel(Effect):
-    """Pre-travel, or a wrong stylus radius, where only the direction of travel is known.
-
-    The same gap on every axis, unlike hysteresis, whose axes differ. Travel is a unit vector against the normal.
-    """
-
-    name, title = "pre_travel", say("Pre-travel of the probe")
-    formula, mechanism = "e = −amount·travel", "probe"
-    points_to = say(
-        "the probe's pre-travel or the stylus radius is wrong by as much in every direction: qualify the probe again, with "
-        "the speed and the force of the measurement"
-    )
-    coefficients = (Parameter("um", unit("µm"), 10.0),)
-    columns, tier = tuple(f"approach_{a}" for a in AXES), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return -MICROMETRE * travel(points)[:, :, None]
-
-
-class ProbeAxial(Effect):
-    """Deflection along the stylus unlike that across it; t is along the stylus (the ram without tip columns).
-
-    A kinematic probe head triggers at once along its axis and late across it.
-    """
-
-    name, title = "probe_axial", say("Deflection of the probe along its axis")
-    formula, mechanism = "e = amount·(n·t)·t", "probe"
-    points_to = say(
-        "the probe gives way differently along the stylus and across it: qualify it with points along the stylus too, and "
-        "check its trigger force"
-    )
-    coefficients = (Parameter("um", unit("µm"), 5.0),)
-    columns, tier = NORMAL, FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        axis = _stylus(points)
-        part = np.einsum("ni,ni->n", normals_of(points), axis)
-        return np.asarray(MICROMETRE * (part[:, None] * axis)[:, :, None], dtype=np.float64)
-
-
-class StylusBending(Effect):
-    """Bending of the stylus t, whose length L follows from the tip columns.
-
-    A cantilever under the probing force gives way by F·L³/(3·E·I).
-    """
-
-    name, title = "stylus_bending", say("Bending of the stylus")
-    formula, mechanism = "e = amount·(L/100 mm)³·(n − (n·t)t)", "probe"
-    points_to = say(
-        "the stylus bends under the probing force: take a shorter or stiffer one, or a lower force, and qualify each stylus "
-        "by itself"
-    )
-    coefficients = (Parameter("um", unit("µm"), 5.0),)
-    columns, tier = (*NORMAL, *TIP), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        length = np.linalg.norm([points.column(name) for name in TIP], axis=0)
-        axis, normals = _stylus(points), normals_of(points)
-        across = normals - np.einsum("ni,ni->n", normals, axis)[:, None] * axis
-        ratio = (length / REFERENCE_LENGTH) ** 3
-        return np.asarray(MICROMETRE * ratio[:, None, None] * across[:, :, None], dtype=np.float64)
-
-
-class TriggerDelay(Effect):
-    """Delay between contact and reading."""
-
-    name, title = "trigger_delay", say("Delay of the probe's trigger")
-    formula, mechanism = "e = delay·speed·n", "controller"
-    points_to = say(
-        "the trigger reaches the controller late: check the probe's interface and cable, and qualify the probe at the speed "
-        "of the measurement"
-    )
-    coefficients = (Parameter("delay_ms", unit("ms"), 1.0),)
-    columns, tier = (*NORMAL, "speed_mm_s"), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return _MILLISECOND * (points.column("speed_mm_s")[:, None] * normals_of(points))[:, :, None]
-
-
 def _stylus(points: Points) -> Floats:
     """Unit vectors (n, 3) along each stylus; along the ram where no tip is recorded."""
     tip = tip_offsets(points)
     length = np.linalg.norm(tip, axis=1, keepdims=True)
     along_tip = tip / np.where(length > 0, length, 1.0)
     return np.where(length > 0, along_tip, np.array([0.0, 0.0, -1.0]))
-
-
-class DigitizerOffset(Effect):
-    """Digitizer misaligned in its scan plane, which turns with the pose.
-
-    An alignment on the reference sphere that was off by [du dv], or a mount that has moved since (Harris 2004 eq. 14–25).
-    """
-
-    name, title = "digitizer_offset", say("Alignment of the digitizer")
-    formula, mechanism = "e = du·u + dv·v", "optical probe"
-    points_to = say(
-        "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align it on the reference "
-        "sphere again, in every pose"
-    )
-    coefficients = (
-        Parameter("u_um", unit("µm"), 20.0, say("along u")),
-        Parameter("v_um", unit("µm"), 20.0, say("along v")),
-    )
-    columns, tier = ("gamma_deg",), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return MICROMETRE * attitudes(points)[:, :, :2]
-
-
-class DigitizerDepth(Effect):
-    """Error in proportion to scan depth, from the column ``depth_mm`` (Feng 2001, Xi 2001)."""
-
-    name, title = "digitizer_depth", say("Depth bias of the digitizer")
-    formula, mechanism = "e = k·depth·v", "optical probe"
-    points_to = say(
-        "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
-    )
-    coefficients = (Parameter("um_per_mm", unit("µm/mm"), 1.0),)
-    columns, tier = ("gamma_deg", "depth_mm"), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return MICROMETRE * points.column("depth_mm")[:, None, None] * attitudes(points)[:, :, 1:2]
-
-
-class DigitizerIncidence(Effect):
-    """Error in proportion to the angles between beam and normal (Feng 2001, Xi 2001).
-
-    The incident angle lies in the scan plane, the projected one across it.
-    """
-
-    name, title = "digitizer_incidence", say("Incidence of the digitizer's light")
-    formula, mechanism = "e = (kᵢ·incident + kₚ·projected)·v", "optical probe"
-    points_to = say(
-        "the digitizer errs where its light meets the surface askew: turn it square to the surface, or correct its readings "
-        "for the angle"
-    )
-    coefficients = (
-        Parameter("incident_um_per_deg", unit("µm/°"), 1.0, say("by incidence")),
-        Parameter("projected_um_per_deg", unit("µm/°"), 1.0, say("by projected angle")),
-    )
-    columns, tier = ("gamma_deg", *NORMAL), FURTHER
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        frame = attitudes(points)
-        own = np.einsum("ni,nij->nj", normals_of(points), frame)
-        angles = np.degrees(np.arctan2(own[:, [0, 2]], np.abs(own[:, 1:2])))
-        return np.asarray(MICROMETRE * frame[:, :, 1:2] * angles[:, None, :], dtype=np.float64)
 
 
 def attitudes(points: Points) -> Floats:
@@ -322,8 +148,92 @@ def attitudes(points: Points) -> Floats:
     return np.moveaxis(euler_313(alpha, beta, np.radians(points.column("gamma_deg"))), 2, 0)
 
 
+def _axially(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
+    axis = _stylus(points)
+    part = np.einsum("ni,ni->n", normals_of(points), axis)
+    return np.asarray(MICROMETRE * (part[:, None] * axis)[:, :, None], dtype=np.float64)
+
+
+def _bending(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
+    length = np.linalg.norm([points.column(name) for name in TIP], axis=0)
+    axis, normals = _stylus(points), normals_of(points)
+    across = normals - np.einsum("ni,ni->n", normals, axis)[:, None] * axis
+    ratio = (length / REFERENCE_LENGTH) ** 3
+    return np.asarray(MICROMETRE * ratio[:, None, None] * across[:, :, None], dtype=np.float64)
+
+
+def _turning(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
+    turns = np.cross(np.eye(3)[None], np.column_stack([points.column(name) for name in TIP])[:, None])
+    return np.asarray(ARCSECOND * turns.swapaxes(1, 2), dtype=np.float64)
+
+
+def _askew(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
+    frame = attitudes(points)
+    own = np.einsum("ni,nij->nj", normals_of(points), frame)
+    angles = np.degrees(np.arctan2(own[:, [0, 2]], np.abs(own[:, 1:2])))
+    return np.asarray(MICROMETRE * frame[:, :, 1:2] * angles[:, None, :], dtype=np.float64)
+
+
+_ABOUT = tuple(
+    Parameter(f"about_{a}_arcsec", unit("″"), 20.0, say("about {axis}", axis=Verbatim(a.upper()))) for a in AXES
+)
+_RADIUS, *_FURTHER, _HEAD = (row.of() for row in (
+    Law("probe_radius", "Error of the effective stylus radius", say("Effective stylus radius"),
+        "true surface point = indicated + r·n", "probe",
+        say("the effective stylus radius is wrong: qualify the probe again"), (Parameter("um", unit("µm"), 10.0),),
+        lambda p, a, b, s: MICROMETRE * normals_of(p)[:, :, None], NORMAL,
+        means=say("probed surfaces are indicated {size} too {wrong}"),
+        sense=(say("deep, inside the material"), say("early, outside the material"))),
+    # the same gap on every axis, unlike hysteresis, whose axes differ; travel is a unit vector against the normal
+    Law("pre_travel", "Pre-travel, or a wrong stylus radius, where only the direction of travel is known",
+        say("Pre-travel of the probe"), "e = −amount·travel", "probe",
+        say("the probe's pre-travel or the stylus radius is wrong by as much in every direction: qualify the probe again, "
+            "with the speed and the force of the measurement"), (Parameter("um", unit("µm"), 10.0),),
+        lambda p, a, b, s: -MICROMETRE * travel(p)[:, :, None], tuple(f"approach_{a}" for a in AXES), FURTHER),
+    # a kinematic probe head triggers at once along its axis and late across it
+    Law("probe_axial",
+        "Deflection along the stylus unlike that across it; t is along the stylus (the ram without tip columns)",
+        say("Deflection of the probe along its axis"), "e = amount·(n·t)·t", "probe",
+        say("the probe gives way differently along the stylus and across it: qualify it with points along the stylus too, "
+            "and check its trigger force"), (Parameter("um", unit("µm"), 5.0),), _axially, NORMAL, FURTHER),
+    # a cantilever under the probing force gives way by F·L³/(3·E·I)
+    Law("stylus_bending", "Bending of the stylus t, whose length L follows from the tip columns",
+        say("Bending of the stylus"), "e = amount·(L/100 mm)³·(n − (n·t)t)", "probe",
+        say("the stylus bends under the probing force: take a shorter or stiffer one, or a lower force, and qualify each "
+            "stylus by itself"), (Parameter("um", unit("µm"), 5.0),), _bending, (*NORMAL, *TIP), FURTHER),
+    Law("trigger_delay", "Delay between contact and reading", say("Delay of the probe's trigger"), "e = delay·speed·n",
+        "controller",
+        say("the trigger reaches the controller late: check the probe's interface and cable, and qualify the probe at the "
+            "speed of the measurement"), (Parameter("delay_ms", unit("ms"), 1.0),),
+        lambda p, a, b, s: _MILLISECOND * (p.column("speed_mm_s")[:, None] * normals_of(p))[:, :, None],
+        (*NORMAL, "speed_mm_s"), FURTHER),
+    # an alignment on the reference sphere that was off by [du dv], or a mount that has moved since (Harris 2004 eq. 14–25)
+    Law("digitizer_offset", "Digitizer misaligned in its scan plane, which turns with the pose",
+        say("Alignment of the digitizer"), "e = du·u + dv·v", "optical probe",
+        say("the digitizer is out of alignment, or has moved in its mount: tighten the mount and align it on the reference "
+            "sphere again, in every pose"),
+        (Parameter("u_um", unit("µm"), 20.0, say("along u")), Parameter("v_um", unit("µm"), 20.0, say("along v"))),
+        lambda p, a, b, s: MICROMETRE * attitudes(p)[:, :, :2], ("gamma_deg",), FURTHER),
+    Law("digitizer_depth", "Error in proportion to scan depth, from the column ``depth_mm`` (Feng 2001, Xi 2001)",
+        say("Depth bias of the digitizer"), "e = k·depth·v", "optical probe",
+        say("the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"),
+        (Parameter("um_per_mm", unit("µm/mm"), 1.0),),
+        lambda p, a, b, s: MICROMETRE * p.column("depth_mm")[:, None, None] * attitudes(p)[:, :, 1:2],
+        ("gamma_deg", "depth_mm"), FURTHER),
+    # the incident angle lies in the scan plane, the projected one across it
+    Law("digitizer_incidence", "Error in proportion to the angles between beam and normal (Feng 2001, Xi 2001)",
+        say("Incidence of the digitizer's light"), "e = (kᵢ·incident + kₚ·projected)·v", "optical probe",
+        say("the digitizer errs where its light meets the surface askew: turn it square to the surface, or correct its "
+            "readings for the angle"),
+        (Parameter("incident_um_per_deg", unit("µm/°"), 1.0, say("by incidence")),
+         Parameter("projected_um_per_deg", unit("µm/°"), 1.0, say("by projected angle"))), _askew,
+        ("gamma_deg", *NORMAL), FURTHER),
+    Law("head_alignment",
+        "A probe head that stands turned against where its styli were qualified, and moves each as it is long (ISO 10360-5)",
+        say("Alignment of the probe head"), "e = ω × stylus", "probe",
+        say("the probe head, or its stylus changer, stands turned against how the styli were qualified: clean its seats, and "
+            "qualify every stylus again"), _ABOUT, _turning, TIP, FURTHER),
+))  # fmt: skip
 EFFECTS: tuple[Effect, ...] = (
-    ProbeRadius(), ProbeLobing(), ArtefactSag(), PreTravel(), ProbeAxial(), StylusBending(), TriggerDelay(),
-    DigitizerOffset(), DigitizerDepth(), DigitizerIncidence(), *(ProbeLobing(count) for count in (2, 4, 6)), ProbeMap(),
-    HeadAlignment(),
+    _RADIUS, ProbeLobing(), ArtefactSag(), *_FURTHER, *(ProbeLobing(count) for count in (2, 4, 6)), ProbeMap(), _HEAD,
 )  # fmt: skip

@@ -13,28 +13,13 @@ import numpy as np
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
-from cmm_uq.machine.physics.effect import AXIS, OTHER, Effect, Family, Nonparametric, OfAxis, Parameter, along, say
+from cmm_uq.machine.physics.effect import AXIS, OTHER, Effect, Family, Nonparametric, Parameter, along, say
+from cmm_uq.machine.physics.effects import Law
 from cmm_uq.machine.physics.kinematics import KinematicChain, carried_offset
 
 # of each plane the axis along which a point moves, and the one that leans, by whose reading it moves
 LEANING = MappingProxyType({"xy": ("x", "y"), "yz": ("y", "z"), "zx": ("x", "z")})
 PLANE, MOVED, LEVER = Verbatim("‹plane›"), Verbatim("‹moved›"), Verbatim("‹lever›")  # blanks in words
-
-
-class Scale(OfAxis):
-    """Linear scale error."""
-
-    family, title = "scale", say("Scale error of {axis}")
-    formula, mechanism = "e_a = s · a", "scale"
-    points_to = say("the scale or its compensation: check the linear compensation of this axis")
-    means = say("lengths along {axis} are indicated {size} too {wrong}")
-    sense = (say("short"), say("long"))
-    everywhere = True
-    coefficients = (Parameter("ppm", unit("ppm"), 300.0),)
-    imitated_by = (Nonparametric("{a}_mm", "{a}"), Nonparametric("time_s", "{a}", scale=True))
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return PPM * points.readings[self.axis]
 
 
 class Lean(Family):
@@ -72,40 +57,6 @@ class Squareness(Lean):
         return np.array(ARCSECOND)
 
 
-class Straightness(Family):
-    """Straightness of carriage a along b as one bow over the travel T from a0."""
-
-    family, title = "straightness", say("Straightness of {axis} along {direction}")
-    formula, mechanism = "e_b = bow · (1 − (2(a − a0)/T − 1)²)", "guideway"
-    points_to = say("a bowed guideway: check straightness and its compensation")
-    means = say(
-        "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} {direction}"
-    )
-    coefficients = (Parameter("bow_um", unit("µm"), 50.0),)
-    idealised_over, imitated_by = "{a}", (Nonparametric("{a}_mm", "{b}"),)
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.other, MICROMETRE * bow(points, self.axis))
-
-
-class Rotation(Family):
-    """Carriage a turns about b in proportion to its travel from a0: roll, pitch or yaw."""
-
-    family, title = "rotation", say("Rotation of carriage {axis} about {about}")
-    formula, mechanism = "e = ε × what carriage a carries, ε_b = r·(a − a0)", "guideway"
-    points_to = say(
-        "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"
-    )
-    means = say("as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}")
-    sense = (say("clockwise"), say("anticlockwise"))
-    coefficients = (Parameter("arcsec_per_m", unit("″/m"), 60.0),)
-    idealised_over = "{a}"
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        low, _ = points.machine.travel(self.axis)
-        return turned(points, self.axis, self.other, ARCSECOND * (points.readings[self.axis] - low) / METRE)
-
-
 def bow(points: Points, axis: str) -> Floats:
     """(n,) a parabola over the travel of an axis, one in the middle and zero at the ends."""
     low, high = points.machine.travel(axis)
@@ -127,9 +78,37 @@ def tip_offsets(points: Points) -> Floats:
     return np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
 
 
-SCALE = MappingProxyType({a: Scale(a) for a in AXES})  # by axis
 SQUARENESS = MappingProxyType({plane: Squareness(plane) for plane in LEANING})  # by plane
 # by carriage and direction, and by carriage and the axis about which it turns
-STRAIGHTNESS = MappingProxyType({(a, b): Straightness(a, b) for a in AXES for b in AXES if a != b})
-ROTATION = MappingProxyType({(a, b): Rotation(a, b) for a in AXES for b in AXES})
+
+
+def _turning(points: Points, axis: str, about: str, _: Sequence[float]) -> Floats:
+    low, _high = points.machine.travel(axis)
+    return turned(points, axis, about, ARCSECOND * (points.readings[axis] - low) / METRE)
+
+
+SCALES, STRAIGHTNESSES, ROTATIONS = (
+    Law("scale", "Linear scale error", say("Scale error of {axis}"), "e_a = s · a", "scale",
+        say("the scale or its compensation: check the linear compensation of this axis"),
+        (Parameter("ppm", unit("ppm"), 300.0),), lambda p, a, b, s: along(a, PPM * p.readings[a]),
+        means=say("lengths along {axis} are indicated {size} too {wrong}"), sense=(say("short"), say("long")),
+        everywhere=True, along_motion=True,
+        imitated_by=(Nonparametric("{a}_mm", "{a}"), Nonparametric("time_s", "{a}", scale=True))),
+    Law("straightness", "Straightness of carriage a along b as one bow over the travel T from a0",
+        say("Straightness of {axis} along {direction}"), "e_b = bow · (1 − (2(a − a0)/T − 1)²)", "guideway",
+        say("a bowed guideway: check straightness and its compensation"), (Parameter("bow_um", unit("µm"), 50.0),),
+        lambda p, a, b, s: along(b, MICROMETRE * bow(p, a)),
+        means=say("as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} {direction}"),
+        idealised_over="{a}", imitated_by=(Nonparametric("{a}_mm", "{b}"),)),
+    Law("rotation", "Carriage a turns about b in proportion to its travel from a0: roll, pitch or yaw",
+        say("Rotation of carriage {axis} about {about}"), "e = ε × what carriage a carries, ε_b = r·(a − a0)", "guideway",
+        say("the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"),
+        (Parameter("arcsec_per_m", unit("″/m"), 60.0),), _turning, idealised_over="{a}",
+        means=say("as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}"),
+        sense=(say("clockwise"), say("anticlockwise"))),
+)  # fmt: skip
+SCALE = MappingProxyType({a: SCALES.of(a) for a in AXES})  # by axis
+# by carriage and direction, and by carriage and the axis about which it turns
+STRAIGHTNESS = MappingProxyType({(a, b): STRAIGHTNESSES.of(a, b) for a in AXES for b in AXES if a != b})
+ROTATION = MappingProxyType({(a, b): ROTATIONS.of(a, b) for a in AXES for b in AXES})
 EFFECTS: tuple[Effect, ...] = (*SCALE.values(), *SQUARENESS.values(), *STRAIGHTNESS.values(), *ROTATION.values())

@@ -7,7 +7,6 @@ cannot be told from one; so it is no effect of its own.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from types import MappingProxyType
 
@@ -16,7 +15,19 @@ import numpy as np
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
-from cmm_uq.machine.physics.effect import AXIS, CONTRACT, FURTHER, Effect, Harmonic, OfAxis, Parameter, Shape, say
+from cmm_uq.machine.physics.effect import (
+    AXIS,
+    CONTRACT,
+    FURTHER,
+    Effect,
+    Harmonic,
+    OfAxis,
+    Parameter,
+    Shape,
+    along,
+    say,
+)
+from cmm_uq.machine.physics.effects import Law
 from cmm_uq.machine.physics.effects.rigid_body import LEANING, Lean, turned
 
 # coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible.
@@ -26,70 +37,6 @@ SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0, what=say("time to settle"))
 # time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more
 LAG = Shape("lag_h", unit("h"), 0.05, 5.0, what=say("lag"))
 _HALF_A_DAY = 12.0  # h
-
-
-class ThermalScale(OfAxis):
-    """Expansion of a scale."""
-
-    family, title = "thermal_scale", say("Thermal expansion of scale {axis}")
-    formula, mechanism = "e_a = α·(temp_a − 20 °C)·a", "temperature"
-    points_to = say("the scale expands and its temperature is not, or wrongly, compensated")
-    means = say("the scale of {axis} expands by {size} {more} than is compensated")
-    sense = (say("more"), say("less"))
-    coefficients = (EXPANSION,)
-    columns = ("temp_{a}_c",)
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return (points.column(f"temp_{self.axis}_c") - REFERENCE_TEMPERATURE) * points.readings[self.axis]
-
-
-class Expanding(Effect):
-    """As a displacement it draws the points together about their middle."""
-
-    mechanism = "artefact"
-    coefficients = (EXPANSION,)
-
-    @abstractmethod
-    def excess(self, points: Points, shape: Sequence[float]) -> Floats:
-        """(n,) temperature above that to which lengths are brought, K."""
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return (-self.excess(points, shape)[:, None] * (points.xyz - points.group_means(points.xyz)))[:, :, None]
-
-
-class ThermalArtefact(Expanding):
-    """Expansion of the artefact."""
-
-    name, title = "thermal_artefact", say("Thermal expansion of the artefact")
-    formula = "length = length at 20 °C · (1 + α·(temp_artefact − 20 °C))"
-    points_to = say("the artefact expands and its temperature is not, or wrongly, compensated")
-    means = say("the artefact expands by {size} {more} than is reckoned with")
-    sense = (say("more"), say("less"))
-    columns = ("temp_artefact_c",)
-
-    def excess(self, points: Points, shape: Sequence[float]) -> Floats:
-        return points.column("temp_artefact_c") - REFERENCE_TEMPERATURE
-
-
-class ArtefactLag(Expanding):
-    """Artefact behind its thermometer.
-
-    It stands beside the artefact's expansion (stated, or ``thermal_artefact``), which follows the thermometer. T′ begins at
-    the first recorded temperature, and temperatures between two records lie on a line.
-    """
-
-    name, title = "artefact_lag", say("Artefact lagging behind its thermometer")
-    formula = "longer by α·(T′ − temp_artefact)·length, τ·dT′/dt = temp_artefact − T′"
-    points_to = say(
-        "the artefact takes on the temperature later than its thermometer: let it soak longer, and fix the thermometer to its "
-        "body"
-    )
-    shape, columns = (LAG,), ("temp_artefact_c", "time_s")
-    tier = FURTHER
-
-    def excess(self, points: Points, shape: Sequence[float]) -> Floats:
-        temperature = points.column("temp_artefact_c")
-        return lagging(points.hours, temperature, shape[0]) - temperature
 
 
 def lagging(hours: Floats, temperature: Floats, lag: float) -> Floats:
@@ -103,27 +50,6 @@ def lagging(hours: Floats, temperature: Floats, lag: float) -> Floats:
         behind = lag * (driving[k + 1] - driving[k]) / step
         body[k + 1] = driving[k + 1] - behind + (body[k] - driving[k] + behind) * np.exp(-step / lag)
     return np.asarray(body[index], dtype=np.float64)
-
-
-class ThermalLag(OfAxis):
-    """A scale behind its thermometer.
-
-    It stands beside the scale's expansion, compensated or ``thermal_scale``, which follows the thermometer (ISO/TR 16907).
-    """
-
-    family, title = "thermal_lag", say("Scale of {axis} lagging behind its thermometer")
-    formula = "e_a = α·(T′ − temp_a)·a, τ·dT′/dt = temp_a − T′"
-    mechanism = "temperature"
-    points_to = say(
-        "the scale of {axis} takes on the temperature later than its thermometer: fix the thermometer to the body of the "
-        "scale, and measure when the room has been steady for longer"
-    )
-    coefficients, shape, columns = (EXPANSION,), (LAG,), ("temp_{a}_c", "time_s")
-    tier = FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        temperature = points.column(f"temp_{self.axis}_c")
-        return (lagging(points.hours, temperature, shape[0]) - temperature) * points.readings[self.axis]
 
 
 class Daily(OfAxis, Harmonic):
@@ -221,71 +147,80 @@ class ThermalSquareness(Lean):
         return np.asarray(ARCSECOND * excess)
 
 
-class ScaleDrift(OfAxis):
-    """A scale that grows with time. A room or a machine that warms steadily."""
-
-    family, title = "scale_drift", say("Scale of {axis} growing with time")
-    formula, mechanism = "e_a = r·time·a", "temperature"
-    points_to = say(
-        "the scale of {axis} changes steadily while the machine or the room warms or cools: measure in thermal equilibrium, "
-        "and check the temperature compensation of this scale"
-    )
-    means = say("lengths along {axis} are indicated ever {wrong}, by {size}")
-    sense = (say("shorter"), say("longer"))
-    coefficients = (Parameter("ppm_per_h", unit("ppm/h"), 5.0),)
-    columns, tier = ("time_s",), FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return PPM * points.hours * points.readings[self.axis]
+def _expanding(points: Points, axis: str, _: str, __: Sequence[float]) -> Floats:
+    return along(axis, (points.column(f"temp_{axis}_c") - REFERENCE_TEMPERATURE) * points.readings[axis])
 
 
-class Settling(OfAxis):
-    """Drift that settles. What follows switching on, or a door left open."""
-
-    family, title = "settling", say("Settling of {axis}")
-    formula, mechanism = "e_a = A·(1 − exp(−time/τ))", "temperature"
-    points_to = say(
-        "the zero of {axis} moves and comes to rest: let machine, probe and artefact settle longer after switching on, "
-        "setting up or an open door"
-    )
-    means = say("at the same reading {axis} moves towards {side} by {size} in all, and settles with {settling}")
-    coefficients = (Parameter("um", unit("µm"), 20.0, say("way")),)
-    shape, columns = (SETTLING,), ("time_s",)
-    tier = FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return MICROMETRE * -np.expm1(-points.hours / shape[0])
+def _behind(points: Points, axis: str, _: str, shape: Sequence[float]) -> Floats:
+    temperature = points.column(f"temp_{axis}_c")
+    return along(axis, (lagging(points.hours, temperature, shape[0]) - temperature) * points.readings[axis])
 
 
-class ScaleSettling(OfAxis):
-    """A scale that settles. An axis warmed by its motor, an air supply that was switched on."""
-
-    family, title = "scale_settling", say("Scale of {axis} settling")
-    formula, mechanism = "e_a = s·(1 − exp(−time/τ))·a", "temperature"
-    points_to = say(
-        "the scale of {axis} takes on another temperature and comes to rest: move the axis to warm it up before measuring, "
-        "and look at what heats or cools it, its motor or the air supply"
-    )
-    means = say("lengths along {axis} come to be indicated {size} too {wrong}, settling with {settling}")
-    sense = (say("short"), say("long"))
-    coefficients = (Parameter("ppm", unit("ppm"), 20.0, say("change")),)
-    shape, columns = (SETTLING,), ("time_s",)
-    tier = FURTHER
-
-    def component(self, points: Points, shape: Sequence[float]) -> Floats:
-        return PPM * -np.expm1(-points.hours / shape[0]) * points.readings[self.axis]
+def _drawn_together(points: Points, excess: Floats) -> Floats:
+    """Of points about their middle, at a temperature (n,) above that to which lengths are brought, K."""
+    return (-excess[:, None] * (points.xyz - points.group_means(points.xyz)))[:, :, None]
 
 
-SCALE_EXPANSION = MappingProxyType({a: ThermalScale(a) for a in AXES})  # by axis
+def _artefact_behind(points: Points, _: str, __: str, shape: Sequence[float]) -> Floats:
+    temperature = points.column("temp_artefact_c")
+    return _drawn_together(points, lagging(points.hours, temperature, shape[0]) - temperature)
+
+
+THERMAL_SCALE, SCALE_DRIFT, SETTLING_OF_ZERO, SCALE_SETTLING, THERMAL_LAG, THERMAL_ARTEFACT, ARTEFACT_LAG = (
+    Law("thermal_scale", "Expansion of a scale", say("Thermal expansion of scale {axis}"), "e_a = α·(temp_a − 20 °C)·a",
+        "temperature", say("the scale expands and its temperature is not, or wrongly, compensated"), (EXPANSION,), _expanding,
+        ("temp_{a}_c",), means=say("the scale of {axis} expands by {size} {more} than is compensated"),
+        sense=(say("more"), say("less")), along_motion=True),
+    Law("scale_drift", "A scale that grows with time. A room or a machine that warms steadily",
+        say("Scale of {axis} growing with time"), "e_a = r·time·a", "temperature",
+        say("the scale of {axis} changes steadily while the machine or the room warms or cools: measure in thermal "
+            "equilibrium, and check the temperature compensation of this scale"),
+        (Parameter("ppm_per_h", unit("ppm/h"), 5.0),), lambda p, a, b, s: along(a, PPM * p.hours * p.readings[a]),
+        ("time_s",), FURTHER, means=say("lengths along {axis} are indicated ever {wrong}, by {size}"),
+        sense=(say("shorter"), say("longer")), along_motion=True),
+    Law("settling", "Drift that settles. What follows switching on, or a door left open", say("Settling of {axis}"),
+        "e_a = A·(1 − exp(−time/τ))", "temperature",
+        say("the zero of {axis} moves and comes to rest: let machine, probe and artefact settle longer after switching on, "
+            "setting up or an open door"), (Parameter("um", unit("µm"), 20.0, say("way")),),
+        lambda p, a, b, s: along(a, MICROMETRE * -np.expm1(-p.hours / s[0])), ("time_s",), FURTHER, shape=(SETTLING,),
+        means=say("at the same reading {axis} moves towards {side} by {size} in all, and settles with {settling}"),
+        along_motion=True),
+    Law("scale_settling", "A scale that settles. An axis warmed by its motor, an air supply that was switched on",
+        say("Scale of {axis} settling"), "e_a = s·(1 − exp(−time/τ))·a", "temperature",
+        say("the scale of {axis} takes on another temperature and comes to rest: move the axis to warm it up before "
+            "measuring, and look at what heats or cools it, its motor or the air supply"),
+        (Parameter("ppm", unit("ppm"), 20.0, say("change")),),
+        lambda p, a, b, s: along(a, PPM * -np.expm1(-p.hours / s[0]) * p.readings[a]), ("time_s",), FURTHER,
+        shape=(SETTLING,), sense=(say("short"), say("long")), along_motion=True,
+        means=say("lengths along {axis} come to be indicated {size} too {wrong}, settling with {settling}")),
+    # it stands beside the scale's expansion, compensated or thermal_scale, which follows the thermometer (ISO/TR 16907)
+    Law("thermal_lag", "A scale behind its thermometer", say("Scale of {axis} lagging behind its thermometer"),
+        "e_a = α·(T′ − temp_a)·a, τ·dT′/dt = temp_a − T′", "temperature",
+        say("the scale of {axis} takes on the temperature later than its thermometer: fix the thermometer to the body of "
+            "the scale, and measure when the room has been steady for longer"), (EXPANSION,), _behind,
+        ("temp_{a}_c", "time_s"), FURTHER, shape=(LAG,), along_motion=True),
+    Law("thermal_artefact", "Expansion of the artefact", say("Thermal expansion of the artefact"),
+        "length = length at 20 °C · (1 + α·(temp_artefact − 20 °C))", "artefact",
+        say("the artefact expands and its temperature is not, or wrongly, compensated"), (EXPANSION,),
+        lambda p, a, b, s: _drawn_together(p, p.column("temp_artefact_c") - REFERENCE_TEMPERATURE), ("temp_artefact_c",),
+        means=say("the artefact expands by {size} {more} than is reckoned with"), sense=(say("more"), say("less"))),
+    # it stands beside the artefact's expansion (stated, or thermal_artefact), which follows the thermometer; T′ begins at the
+    # first recorded temperature, and temperatures between two records lie on a line
+    Law("artefact_lag", "Artefact behind its thermometer", say("Artefact lagging behind its thermometer"),
+        "longer by α·(T′ − temp_artefact)·length, τ·dT′/dt = temp_artefact − T′", "artefact",
+        say("the artefact takes on the temperature later than its thermometer: let it soak longer, and fix the thermometer "
+            "to its body"), (EXPANSION,), _artefact_behind, ("temp_artefact_c", "time_s"), FURTHER, shape=(LAG,)),
+)  # fmt: skip
+SCALE_EXPANSION = MappingProxyType({a: THERMAL_SCALE.of(a) for a in AXES})  # by axis
 EFFECTS: tuple[Effect, ...] = (
-    *SCALE_EXPANSION.values(), ThermalArtefact(), ThermalGradient(),
-    *(family(a) for family in (ScaleDrift, Settling, ScaleSettling, ThermalLag, Daily, DailyScale) for a in AXES),
-    *(ThermalSquareness(plane) for plane in LEANING),
+    *SCALE_EXPANSION.values(), THERMAL_ARTEFACT.of(), ThermalGradient(), *SCALE_DRIFT.each(AXES),
+    *SETTLING_OF_ZERO.each(AXES), *SCALE_SETTLING.each(AXES), *THERMAL_LAG.each(AXES),
+    *(family(a) for family in (Daily, DailyScale) for a in AXES), *(ThermalSquareness(plane) for plane in LEANING),
     CarriageGradient("bridge", say("bridge"), "yx", ("top", "bottom"), say(
         "the bridge bends: its upper and lower side differ in temperature, look for warm air, lamps or a draught above it"
     )),
     CarriageGradient("ram", say("ram"), "zy", ("front", "back"), say(
         "the ram bends: its front and back differ in temperature, look for a motor, a lamp, sun or a draught at one side"
     )),
-    ArtefactLag(),
+    ARTEFACT_LAG.of(),
 )  # fmt: skip
