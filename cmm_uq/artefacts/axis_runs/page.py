@@ -15,7 +15,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, s
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
-from cmm_uq.certificate.plots.residuals import positioning_plot, readings_plot, residual_volume
+from cmm_uq.certificate.plots.residuals import deviations_plot, positioning_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.machine.physics.kinematics import PARAMETRIC_ERRORS
 from cmm_uq.maths.geometry.positioning import MissingReadingError, PositioningRuns
@@ -249,12 +249,15 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
 
 def _readings(result: Result) -> Block:
     artefact = cast("AxisRuns", result.artefact)
-    return readings_plot(
+    off = artefact.about_zero(artefact.readings) / MICROMETRE
+    return deviations_plot(
         result,
-        artefact.about_zero(artefact.readings) / MICROMETRE,
-        scale=artefact.noise_scale,
+        off,
+        say("{count} readings: as recorded they deviate", count=len(off)),
+        say("from their zero"),
+        expanded_um=result.noise.expanded * artefact.noise_scale,
         reference=say("mean of the run"),
-        from_reference=say("from their zero"),
+        position_label=say("Measurement"),
         caption=say(
             "Readings about the zero of their run, as recorded and after the fitted model, with U (k = {k}); of a rotation "
             "times the arm.",

@@ -21,7 +21,7 @@ from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import METRE, MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
-from cmm_uq.certificate.plots.residuals import readings_plot, residual_volume
+from cmm_uq.certificate.plots.residuals import deviations_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
@@ -243,8 +243,10 @@ def _readings(result: Result) -> Block:
         k=number(result.noise.coverage_factor, ".2f"),
     )
     off = (np.linalg.norm(away, axis=1) - artefact.distances) / MICROMETRE
-    reference = say("distance from the best station")
-    return readings_plot(result, off, reference=reference, from_reference=say("from the best station"), caption=caption)
+    return deviations_plot(
+        result, off, say("{count} readings: as recorded they deviate", count=len(off)), say("from the best station"),
+        reference=say("distance from the best station"), position_label=say("Measurement"), caption=caption,
+    )  # fmt: skip
 
 
 def _targets(targets: dict[str, Any]) -> Block | None:

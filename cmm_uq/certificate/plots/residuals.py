@@ -216,16 +216,6 @@ def deviations_plot(
     )  # fmt: skip
 
 
-def readings_plot(
-    result: Result, off_um: Floats, *, reference: Text, from_reference: Text, caption: Text, scale: Floats | float = 1.0
-) -> Plot:
-    """Readings (n,) against a reference, µm, by measurement; ``scale`` of their U."""
-    return deviations_plot(
-        result, off_um, say("{count} readings: as recorded they deviate", count=len(off_um)), from_reference,
-        expanded_um=result.noise.expanded * scale, reference=reference, position_label=say("Measurement"), caption=caption,
-    )  # fmt: skip
-
-
 def positioning_plot(
     targets: ArrayLike, mean: Floats, s: Floats, arrows: str, unit: Text, *, label: Text, caption: Text, alternative: Text
 ) -> Plot:  # fmt: skip
