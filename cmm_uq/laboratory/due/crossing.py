@@ -114,21 +114,15 @@ class Crossing:
 
 
 def crossing(
-    series: Series | drift.DriftHistory,
-    limit: float,
-    prior: drift.DriftPrior | None = None,
-    *,
-    one_sided: bool = False,
-    until: float = _HORIZON,
+    series: Series | drift.DriftHistory, limit: float, prior: drift.DriftPrior | None = None, *, until: float = _HORIZON
 ) -> Crossing:
     """When one machine's error will first be beyond its limit.
 
     Parameters
     ----------
     series : of the records, or a history.
-    limit : the error conforms while |error| ≤ limit, or error ≤ limit.
+    limit : the error conforms while |error| ≤ limit.
     prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_model.FleetPrior.prior`), or none.
-    one_sided : only what is above the limit is beyond it.
     until : days after the last certificate that are looked at.
 
     Raises
@@ -138,13 +132,12 @@ def crossing(
     if not (np.isfinite(limit) and limit > 0):
         raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
     known = series if isinstance(series, drift.DriftHistory) else drift.history(series)
-    return crossing_of(followed(known, limit, prior), limit, one_sided=one_sided, until=until)
+    return crossing_of(followed(known, limit, prior), limit, until)
 
 
-def crossing_of(known: FollowedHistory, limit: float, *, one_sided: bool = False, until: float = _HORIZON) -> Crossing:
+def crossing_of(known: FollowedHistory, limit: float, until: float = _HORIZON) -> Crossing:
     """The same of a history that was followed already."""
-    many = crossings(known.machines, known.prior, known.state, limit, one_sided=one_sided, until=until, days=FINE)
-    return many.one(0)
+    return crossings(known.machines, known.prior, known.state, limit, until=until, days=FINE).one(0)
 
 
 class _States(NamedTuple):
@@ -159,7 +152,7 @@ class _States(NamedTuple):
 
 
 def crossings(
-    machines: drift.Histories, prior: drift.DriftPrior, state: DriftState, limit: Floats | float, *, one_sided: bool = False,
+    machines: drift.Histories, prior: drift.DriftPrior, state: DriftState, limit: Floats | float, *,
     paths: int = PATHS, until: float = _HORIZON, days: Floats = DAYS,
 ) -> Crossings:  # fmt: skip
     """When the errors of many machines will be; later than ``until`` days, probabilities are those of that day."""
@@ -172,7 +165,7 @@ def crossings(
     limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), N)
     chunk = max(1, _AT_ONCE // (paths * 8))
     numbers, ahead = _numbers(paths, len(days) - 1), days[: 1 + int(np.searchsorted(days, until))]
-    found = [_probabilities(flat, np.arange(i, min(i + chunk, N)), limits, one_sided, numbers, ahead)
+    found = [_probabilities(flat, np.arange(i, min(i + chunk, N)), limits, numbers, ahead)
              for i in range(0, N, chunk)]  # fmt: skip
     mean = (flat.weight * flat.mean[:2]).sum(axis=-1)
     variance = flat.covariance[[0, 1], [0, 1]]
@@ -210,9 +203,7 @@ def _drawn(states: _States, which: Ints, chosen: Ints, normal: Floats) -> Floats
     return drawn
 
 
-def _probabilities(
-    states: _States, which: Ints, limits: Floats, one_sided: bool, numbers: tuple[Floats, ...], days: Floats
-) -> Floats:
+def _probabilities(states: _States, which: Ints, limits: Floats, numbers: tuple[Floats, ...], days: Floats) -> Floats:
     place, normal, walk, stepping = numbers
     cumulated = np.cumsum(states.weight[which], axis=1)
     chosen = np.stack([np.searchsorted(row / row[-1], place) for row in cumulated])
@@ -221,7 +212,7 @@ def _probabilities(
     walking, often = prior.walk[node], prior.steps_per_year[node]
     level, *theta = _drawn(states, which, chosen, normal) / walking  # all in units of what a year's wandering adds
     size, high = prior.step_sd[node] / walking, limits[which][:, None] / walking
-    inside = ((level <= high) & (one_sided | (-high <= level))).astype(np.float64)
+    inside = (np.abs(level) <= high).astype(np.float64)
     part = np.full(len(place), 1 / len(place))
     survival = np.empty((len(which), len(days)))
     survival[:, 0] = inside @ part
@@ -232,14 +223,13 @@ def _probabilities(
         after += wandering[g]
         # probability that a bridge from one level to the other stays within the limits, given that its ends do
         crosses = np.expm1(-2 / gap * np.maximum(high - level - up, 0.0) * np.maximum(high - after - up_then, 0.0))
-        if not one_sided:
-            crosses *= -np.expm1(
-                -2 / gap * np.maximum(high + level - down, 0.0) * np.maximum(high + after - down_then, 0.0)
-            )
+        crosses *= -np.expm1(
+            -2 / gap * np.maximum(high + level - down, 0.0) * np.maximum(high + after - down_then, 0.0)
+        )
         inside *= -crosses
         level, stepped = after, np.nonzero(stepping[0, g] < often * gap)
         level[stepped] += size[stepped] * stepping[1, g, stepped[1]]
-        inside[stepped] *= (level[stepped] <= high[stepped]) & (one_sided | (-high[stepped] <= level[stepped]))
+        inside[stepped] *= np.abs(level[stepped]) <= high[stepped]
         survival[:, g + 1] = inside @ part
     return 1.0 - survival
 
