@@ -23,7 +23,7 @@ from cmm_uq.base.units import Unit, unit
 _BLANKS = ("axis", "other", "size", "side", "sense", "second")
 AXIS, OTHER, SIZE, SIDE, SENSE, SECOND = (Verbatim(f"‹{blank}›") for blank in _BLANKS)
 # what stands for them in a pattern
-_NAMES: Mapping[str, Text] = {
+BLANKS: Mapping[str, Text] = {
     "axis": AXIS, "other": OTHER, "direction": OTHER, "about": OTHER, "size": SIZE, "amplitude": SIZE, "side": SIDE,
     "sense": SENSE, "more": SENSE, "wrong": SENSE, "where": SECOND, "period": SECOND, "settling": SECOND,
 }  # fmt: skip
@@ -31,7 +31,7 @@ _NAMES: Mapping[str, Text] = {
 
 def say(pattern: str, /, **arguments: Argument) -> Message:
     """Words of an effect: what its pattern names without an argument is a blank."""
-    known = {**_NAMES, **arguments}
+    known = {**BLANKS, **arguments}
     return Message(pattern, {name: known[name] for name in sorted(fields_of(pattern))})
 
 

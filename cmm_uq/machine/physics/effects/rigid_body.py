@@ -79,7 +79,6 @@ def tip_offsets(points: Points) -> Floats:
 
 
 SQUARENESS = MappingProxyType({plane: Squareness(plane) for plane in LEANING})  # by plane
-# by carriage and direction, and by carriage and the axis about which it turns
 
 
 def _turning(points: Points, axis: str, about: str, _: Sequence[float]) -> Floats:
