@@ -294,17 +294,20 @@ class Result:
         for effect in self.model.effects:
             if effect.name in tolerances:
                 name, quantity = next(iter(self.parameters[effect.name].items()))
-                exact = self._taken_as_exact((effect.name, name)) if effect.name not in self.free else ()
+                exact = self._taken_as_exact(effect.name) if effect.name not in self.free else ()
                 found.append(by_tolerance(f"{effect.name}.{name}", effect.title, quantity, tolerances[effect.name],
                                           determined=effect.name not in self.free, against=[*against, *exact]))  # fmt: skip
         return Verdicts(found)
 
-    def _taken_as_exact(self, key: tuple[str, str]) -> list[Text]:
+    def _taken_as_exact(self, effect: str) -> list[Text]:
         if not (self.artefact.exact or any(size.sd == 0 for size in self.artefact.sizes)):
             return []
-        i = [unknown.key for unknown in self.posterior.unknowns].index(key)
-        weights = gain(self.estimate.linear, float(np.median(self.posterior.sigma)))[i]
-        return taken_as_exact(self.artefact, self.model.used, weights, float(self.values[:, i].std()))
+        weights = gain(self.estimate.linear, float(np.median(self.posterior.sigma)))
+        own = [i for i, unknown in enumerate(self.posterior.unknowns) if unknown.key[0] == effect]
+        artefact, used, u = self.artefact, self.model.used, self.values.std(axis=0)
+        return list(
+            dict.fromkeys(text for i in own for text in taken_as_exact(artefact, used, weights[i], float(u[i])))
+        )
 
     @cached_property
     def flagged(self) -> NDArray[np.bool_]:

@@ -209,13 +209,16 @@ def taken_as_exact(artefact: Artefact, used: NDArray[np.bool_], weights: Floats,
     """Of what an estimate rests on nobody states an uncertainty, in words.
 
     used : which observations (m,) it is from. weights : (n,) by how much it changes with each of these, per mm.
-    u : its standard uncertainty. It rests on a length of which a ppm moves it by a thousandth of u, and on readings that have
-    a thousandth of the square of its weights.
+    u : its standard uncertainty. It rests on a size of which a ppm moves it by a thousandth of u, on certified places where
+    it is of several, and on readings that have a thousandth of the square of its weights.
     """
     found = [title for title, own in artefact.exact if np.sum(weights[own[used]] ** 2) > _NOTICED * (weights @ weights)]
-    along = growth(artefact)
-    if along is not None and abs(weights @ along[used]) * PPM > _NOTICED * u:
-        found += [size.title for size in artefact.sizes if size.role == "dimension" and size.sd == 0]
+    exact = [i for i, size in enumerate(artefact.sizes) if size.role == "dimension" and size.sd == 0]
+    if exact:
+        nominal = [artefact.sizes[i].nominal for i in exact]
+        moved = np.abs(weights @ artefact.size_change()[used][:, exact]) * nominal * PPM
+        places = isinstance(getattr(artefact, "certificate", None), CertifiedPlaces)
+        found += [artefact.sizes[i].title for i, by in zip(exact, moved, strict=True) if places or by > _NOTICED * u]
     return [say("{title} is given without an uncertainty", title=title) for title in found]
 
 

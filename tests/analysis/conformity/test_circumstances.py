@@ -295,16 +295,28 @@ def test_a_calibration_that_did_not_hold_makes_no_pass_and_hides_nothing_worse(l
     assert (found.outcome, lack in found.missing) == (outcome, True)
 
 
-def test_a_tolerance_on_what_rests_on_a_length_without_uncertainty_is_no_pass(iota: Path, tmp_path: Path) -> None:
-    """Scale of X is 79 ± 40 ppm, 80 ± 33 ppm with an exact length; a squareness comes from comparing bars with each other."""
-    shutil.copytree(iota, tmp_path / "job")
-    text = re.sub(r"(?m)^u_um = .*\n", "", (iota / "job.toml").read_text(encoding="utf-8"))
-    tolerances = "tolerances = { scale_x = 115.0, squareness_xy = 300.0 }"
-    text = re.sub(r"(?m)^effects = .*$", rf"\g<0>\n{tolerances}", text)
-    (tmp_path / "job" / "job.toml").write_text(text, encoding="utf-8")
-    found = {one.name: one for one in cmm_uq.report(tmp_path / "job").outcome.verdicts}
-    scale, squareness = found["scale_x.ppm"], found["squareness_xy.angle_arcsec"]
-    assert (scale.outcome, list(map(str, scale.missing))) == (
-        "undecided", ["Length of the bar is given without an uncertainty"],
-    )  # fmt: skip
-    assert (squareness.outcome, squareness.missing) == ("pass", ())
+@pytest.mark.parametrize(("example", "u", "tolerances", "undecided"), [
+    # 79 ± 40 ppm, 80 ± 33 with an exact length; a squareness comes from comparing bars with each other
+    ("iota-1102-20C", "u_um", {"scale_x": 115.0, "squareness_xy": 300.0}, {"scale_x.ppm"}),
+    # places of balls: 11.91 ± 0.65″, 11.91 ± 0.58″ with exact ones
+    ("plate-simulated", "u_um", {"scale_x": 60.0, "squareness_xy": 300.0}, {"scale_x.ppm", "squareness_xy.angle_arcsec"}),
+    ("sphere-simulated", "u_um", {"probe_radius": 5.0, "probe_lobing": 5.0}, {"probe_radius.um"}),
+])  # fmt: skip
+def test_a_tolerance_on_what_rests_on_a_size_without_uncertainty_is_no_pass(
+    example: str, u: str, tolerances: dict[str, float], undecided: set[str], tmp_path: Path
+) -> None:
+    shutil.copytree(ROOT / "examples" / example, tmp_path / "job")
+    text = (tmp_path / "job" / "job.toml").read_text(encoding="utf-8")
+    for stated in ("", rf"(?m)^{u} = .*\n"):
+        text = re.sub(stated, "", text) if stated else text
+        asked = ", ".join(f"{name} = {limit}" for name, limit in tolerances.items())
+        job = re.sub(r"(?m)^effects = .*$", rf"\g<0>\ntolerances = {{ {asked} }}", text)
+        job = re.sub(r"(?s)\[\[conformity\]\].*", "", job)
+        (tmp_path / "job" / "job.toml").write_text(job, encoding="utf-8")
+        found = {one.name: one for one in cmm_uq.report(tmp_path / "job").outcome.verdicts}
+        withheld = {
+            name for name, one in found.items() if any("given without an uncertainty" in text for text in one.missing)
+        }
+        assert withheld == (undecided if stated else set())
+        assert all(found[name].outcome == "undecided" for name in withheld)
+        assert len(found) == len(tolerances)
