@@ -224,6 +224,13 @@ class _Offset(ResultsPart):
     W1: _Component
 
 
+class _Pose(ResultsPart):
+    pose: int
+    alpha_deg: float
+    beta_deg: float
+    gamma_deg: float
+
+
 Three = tuple[float, float, float]
 _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 
@@ -231,7 +238,7 @@ _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 class _Digitizer(ResultsPart):
     offset_mm: _Offset
     covariance_mm2: Annotated[list[_Row], Field(min_length=3, max_length=3)]
-    poses: Annotated[list[Pose], Field(min_length=1, max_length=LISTED.most)]
+    poses: Annotated[list[_Pose], Field(min_length=1, max_length=LISTED.most)]
 
 
 class _DigitizerResults(ResultsFile):
@@ -281,7 +288,8 @@ def digitizer_of(
         raise CmmUqError(f"is of a simulated recording, job {results.job.id!r}", where=str(folder / name),
                          fix="Measure the digitizer: a simulated calibration serves simulated jobs only")  # fmt: skip
     calibrated, offset = results.digitizer, results.digitizer.offset_mm
-    poses, covariance = tuple(facts.poses or calibrated.poses), tuple(map(_three, calibrated.covariance_mm2))
+    poses = tuple(facts.poses) or tuple(Pose(**pose.model_dump()) for pose in calibrated.poses)
+    covariance = tuple(map(_three, calibrated.covariance_mm2))
     mount = offset.U1.value, offset.V1.value, offset.W1.value
     return DescribedDigitizer(mount, poses, covariance, name, results.job.id)
 

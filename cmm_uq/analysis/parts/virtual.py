@@ -37,8 +37,9 @@ from cmm_uq.analysis.parts.result import Inverse, alike, inverse, nodes_of, tria
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.field import family_of
-from cmm_uq.maths.uncertainty.propagation import Source
+from cmm_uq.maths.uncertainty.propagation import Simulated, Source, simulate_adaptively
 
+FEWEST = 100_000  # virtual measurements, after which u is known to a quarter of a percent
 CHECKED = 200  # draws that are looked at exactly, beside first order
 ROUNDING = 1e-9  # mm and rad: a spread below which is none
 THREADED = 2_000  # draws of a block that are worth a thread
@@ -61,6 +62,8 @@ _OfMachine = tuple[CommonCause, Floats, list[PartCause], dict[str, str]]
 
 @dataclass(frozen=True, eq=False)
 class MeasurementConditions:
+    """How and where a part is measured."""
+
     machine: MachineState  # as its certificate states it
     poses: tuple[PartPose, ...] = (PartPose(),)  # where the part lies; several where nobody knows, each as likely
     surroundings: Surroundings = field(default_factory=Surroundings)
@@ -333,6 +336,10 @@ class Virtual:
     def source(self) -> Source:
         """The errors as outputs of a Monte Carlo."""
         return Source(self.names, lambda random, n: np.ascontiguousarray(self.errors(random, n).T))
+
+    def settled(self, coverage: float = 0.95, digits: int = 2, seed: int = 0) -> Simulated:
+        """As many as the digits of u that are asked for need (JCGM 101, 7.9), a hundred thousand at least."""
+        return simulate_adaptively(self.source, coverage, digits, seed, fewest_trials=FEWEST)
 
 
 _DRAWS = 4000
