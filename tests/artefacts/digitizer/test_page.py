@@ -15,6 +15,8 @@ from cmm_uq.artefacts.digitizer_page import DigitizerFigures, results
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.certificate.sections.results import summary
+from cmm_uq.jobs.reports import digitizer_of
+from cmm_uq.jobs.tables.machine import DigitizerFacts
 from cmm_uq.machine.physics.digitizer import euler_313
 from tests.artefacts.digitizer.aligned import OFFSET, THREE
 from tests.artefacts.reading import number
@@ -84,6 +86,19 @@ def test_results_hold_offset_covariance_and_poses() -> None:
     ]
     assert found["sphere_mm"] == pytest.approx([300.0, 480.0, -480.0], abs=0.02)
     json.dumps(found, allow_nan=False)
+
+
+def test_a_job_reads_offset_covariance_and_attitudes_back_from_what_its_calibration_wrote() -> None:
+    written = results(analysed(JOB))
+    content = json.dumps({"schema": "cmm-uq/results/1", "job": {"id": JOB, "origin": "simulated"}, **written}).encode()
+    facts = DigitizerFacts(calibration="results.json")
+    found = digitizer_of(facts, {"results.json": content}, Path("job"), "simulated")
+    assert found is not None
+    assert [(p.pose, p.alpha_deg, p.beta_deg, p.gamma_deg) for p in found.poses] == [
+        (i, *angles) for i, angles in enumerate(THREE, 1)
+    ]
+    assert found.offset_mm == tuple(written["digitizer"]["offset_mm"][name]["value"] for name in ("U1", "V1", "W1"))
+    assert np.array_equal(np.array(found.covariance_mm2), np.array(written["digitizer"]["covariance_mm2"]))
 
 
 def test_what_is_known_of_a_set_up_is_no_certified_dimension() -> None:
