@@ -102,9 +102,12 @@ def test_a_machine_held_to_trusted_signers_is_held_to_them_again(tmp_path: Path)
     assert held.inquiry.word == "VERIFIED", (held.inquiry.findings, held.inquiry.unchecked)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "pdf", ["part-iota/machine/certificate.pdf", "part-plate-simulated/machine/certificate-simulated.pdf"]
 )
 def test_the_certificates_of_machines_in_examples_are_what_this_version_computes(pdf: str) -> None:
+    """Layout is compared only where the libraries are those that it was made with; figures are everywhere."""
     found = verify([ROOT / "examples" / pdf], rerun=True)
-    assert found.inquiry.word == "VERIFIED", "\n".join(map(str, found.inquiry.findings[:5]))
+    assert not found.inquiry.findings, "\n".join(map(str, found.inquiry.findings[:5]))
+    assert found.inquiry.done["again"] > 1000
