@@ -133,7 +133,8 @@ class Desk(DeskFolder):
             jobs.DELETE: self.delete,
             jobs.PLAN: self.plan,
             jobs.PART: self.create_part,
-            jobs.POINTS: self.points,
+            jobs.POINTS: partial(self.add_file, "recording"),
+            jobs.CERTIFIED: partial(self.add_file, "artefact.certificate"),
             jobs.FACTS: self.state_facts,
             jobs.VERIFY: self.verify,
         }

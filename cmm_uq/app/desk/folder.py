@@ -7,7 +7,6 @@ A part on the desk: its plan and the machine's certificate make a job, and measu
 
 from __future__ import annotations
 
-import re
 import tempfile
 from collections.abc import Mapping
 from http import HTTPStatus
@@ -23,22 +22,6 @@ from cmm_uq.app.serve.exchange import DESK, WebRequest, WebResponse, read_form, 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of, text_of
 from cmm_uq.base.messages import Verbatim, number, say
-
-_RECORDING = re.compile(r"^\[recording\][^\n]*\n", re.MULTILINE)
-_FILE = re.compile(r"^file = [^\n]*\n", re.MULTILINE)
-
-
-def with_points(text: str, name: str) -> str:
-    """job.toml with the file of its measured points; nothing else is changed."""
-    line = f'file = "{name}"\n'
-    found = _RECORDING.search(text)
-    if found is None:
-        return f"{text.rstrip()}\n\n[recording]\n{line}"
-    end = text.find("\n[", found.end())
-    block = text[found.end() : end + 1 if end >= 0 else len(text)]
-    changed = _FILE.sub(lambda _: line, block, count=1) if _FILE.search(block) else line + block
-    return text[: found.end()] + changed + text[found.end() + len(block) :]
-
 
 VERIFY_S = 180.0  # s that reading and comparing a certificate may take
 
@@ -130,14 +113,19 @@ class DeskFolder(Application):
         self.drafts.delete(one)
         return to(jobs.JOB, name=folder)
 
-    def points(self, request: WebRequest) -> WebResponse:
-        """Measured points of a part, into its folder and its job.toml."""
+    def add_file(self, table: str, request: WebRequest) -> WebResponse:
+        """A dropped file into the folder of a job, and its name into a table of job.toml."""
         request.only(("name",))
         name = self.job_of(request.text("name"))
         path = self.root / name / "job.toml"
-        content = content_of(path, JOB_BYTES, "")
-        points = place.received(request, path.parent)
-        place.write_over(path, with_points(content.decode(), points).encode(), place.sha256(content))
+        content = self._job_file(name)
+        file = place.received(request, path.parent)
+        try:
+            text = self.reader.ask("with_file", text=text_of(content, "job.toml"), table=table, name=file)
+            place.write_over(path, text.encode(), place.sha256(content))
+        except CmmUqError:
+            (path.parent / file).unlink(missing_ok=True)
+            raise
         return to(jobs.JOB, name=name)
 
     def verify(self, request: WebRequest) -> p.WebPage:

@@ -127,7 +127,8 @@ def difference(theirs: bytes, mine: bytes) -> str:
 
 
 JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run", "cancel", "certificate", "file"))
-PART, POINTS, DELETE, EVENTS = (f"{DESK}/{name}" for name in ("part", "points", "delete", "events"))
+PART, POINTS, CERTIFIED = (f"{DESK}/{name}" for name in ("part", "points", "certified"))
+DELETE, EVENTS = f"{DESK}/delete", f"{DESK}/events"
 PLAN, VERIFY = f"{DESK}/plan", f"{DESK}/verify"
 FIELD, FACTS = f"{DESK}/field.json", f"{DESK}/facts"
 RESULTS, REPORTS = "results.json", "reports"

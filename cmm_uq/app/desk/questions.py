@@ -268,26 +268,39 @@ def with_facts(text: str, values: Mapping[str, str]) -> str:
     standard = {"conformity.standard": values.get("conformity.standard", "")}
     tables = tables_of({**standard, **{key: value for key, value in changed.items() if value}})
     for dotted, value in changed.items():
-        *path, key = dotted.split(".")
-        place: Any = document
-        for name in path:
-            if name not in place:
-                place[name] = (
-                    tomlkit.aot()
-                    if name == "conformity"
-                    else tomlkit.table()
-                    if place is document
-                    else tomlkit.inline_table()
-                )
-            place = place[name]
-            if isinstance(place, list):
-                if not place:
-                    place.append(tomlkit.table())
-                place = place[0]
+        table, _, key = dotted.rpartition(".")
+        place = _place(document, table)
         if value:
             place[key] = _stated(tables, dotted)
         elif isinstance(place, AbstractTable | tomlkit.items.InlineTable):
             place.remove(key)
     if "artefact.U_um" in changed and changed["artefact.U_um"] and "k" not in document["artefact"]:
         document["artefact"]["k"] = 2.0
+    return tomlkit.dumps(document)
+
+
+def _place(document: tomlkit.TOMLDocument, table: str) -> Any:
+    """A table by its dotted name, the first of several; one that is not there is begun."""
+    place: Any = document
+    for name in table.split("."):
+        if name not in place:
+            begun = tomlkit.table() if place is document else tomlkit.inline_table()
+            place[name] = tomlkit.aot() if name == "conformity" else begun
+        place = place[name]
+        if isinstance(place, list):
+            if not place:
+                place.append(tomlkit.table())
+            place = place[0]
+    return place
+
+
+def with_file(text: str, table: str, name: str) -> str:
+    """The text of job.toml with the file that a table names; all else in it as it stands."""
+    try:
+        document = tomlkit.parse(text)
+        _place(document, table)["file"] = name
+    except (tomlkit.exceptions.TOMLKitError, TypeError, RecursionError):
+        raise CmmUqError(
+            f"has no table that [{table}] file could stand in", where="job.toml", fix="Mend its text"
+        ) from None
     return tomlkit.dumps(document)

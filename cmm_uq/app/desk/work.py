@@ -146,6 +146,7 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "create_part": create_part,
     "facts": questions.facts,
     "with_facts": questions.with_facts,
+    "with_file": questions.with_file,
     "report": report,
     "verification": verification,
     "ready": lambda: True,

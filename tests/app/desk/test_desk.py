@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import time
+import tomllib
 from contextlib import closing
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from cmm_uq.app.desk.workers import Worker
 from cmm_uq.base.errors import CmmUqError
 from tests.app.desk.conftest import Visitor
 from tests.app.desk.test_questions import ANSWERS, EXPORT
+from tests.app.serve.test_exchange import BOUNDARY, form
 from tests.conftest import ROOT
 
 
@@ -296,3 +298,23 @@ def test_for_others_it_is_refused_with_what_is_for_them(tmp_path: Path) -> None:
     assert told.returncode == 2
     assert "for this machine alone" in told.stderr
     assert "cmm-uq serve --bind" in told.stderr
+
+
+def test_the_artefacts_certificate_is_dropped_beside_its_job_and_named(worked: Visitor) -> None:
+    def drop(name: str) -> int:
+        media = f"multipart/form-data; boundary={BOUNDARY}"
+        own = {"Content_Type": media, "Origin": f"http://{worked.host}"}
+        return worked.send(
+            "POST", "/desk/certified?name=K-1", form(b"point;reference_mm\n1;0\n2;40\n", name), **own
+        ).status
+
+    job = worked.desk.root / "K-1" / "job.toml"
+    assert drop("gauge.csv") == 303
+    text = job.read_text(encoding="utf-8")
+    assert tomllib.loads(text)["artefact"]["certificate"]["file"] == "gauge.csv"
+    assert "gauge.csv" in worked.get("/desk/job?name=K-1").text
+    assert drop("gauge.csv") == 409  # over nothing
+    job.write_text(text.replace("[artefact]", "[[artefact", 1), encoding="utf-8")
+    assert drop("other.csv") == 409
+    assert not (job.parent / "other.csv").exists()
+    job.write_text(text, encoding="utf-8")

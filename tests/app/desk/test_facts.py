@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from cmm_uq.app.desk.questions import facts, with_facts
+from cmm_uq.app.desk.questions import facts, with_facts, with_file
 from cmm_uq.base.errors import CmmUqError
 from tests.app.desk.conftest import Visitor
 from tests.app.desk.test_desk import made
@@ -90,3 +90,22 @@ def test_two_tabs_with_fields_do_not_write_over_each_other(seated: Visitor) -> N
     assert b"CMM six" in path.read_bytes()
     found = seated.post("/desk/check", name=name, **{**again, "artefact.length_mm": "399"})
     assert "404.205" in found.text
+
+
+@pytest.mark.parametrize(("text", "table", "file"), [
+    ('[job]\nid = "x"\n', "recording", '[job]\nid = "x"\n\n[recording]\nfile = "p.csv"\n'),
+    ('[recording]  # x\nfile = "o"\n\n[part]\na = "z"\n', "recording",
+     '[recording]  # x\nfile = "p.csv"\n\n[part]\na = "z"\n'),
+    ('[recording]\nunit = "mm"\n', "recording", '[recording]\nunit = "mm"\nfile = "p.csv"\n'),
+    ('[artefact]\nk = 2  # x\n', "artefact.certificate", '[artefact]\nk = 2  # x\ncertificate = {file = "p.csv"}\n'),
+    ('[artefact]\n[artefact.certificate]\nnumber = "7"\n', "artefact.certificate",
+     '[artefact]\n[artefact.certificate]\nnumber = "7"\nfile = "p.csv"\n'),
+])  # fmt: skip
+def test_a_dropped_file_is_named_and_nothing_else_is_changed(text: str, table: str, file: str) -> None:
+    assert with_file(text, table, "p.csv") == file
+
+
+@pytest.mark.parametrize("text", ["artefact = 3\n", '[artefact]\ncertificate = "x"\n', "[artefact\n"])
+def test_a_file_is_named_in_no_job_that_has_no_table_for_it(text: str) -> None:
+    with pytest.raises(CmmUqError, match=r"job\.toml: has no table that"):
+        with_file(text, "artefact.certificate", "p.csv")

@@ -8,7 +8,6 @@ import time
 import pytest
 from pypdf import PdfReader
 
-from cmm_uq.app.desk.folder import with_points
 from tests.app.desk.conftest import Answer, Visitor
 from tests.app.serve.test_exchange import BOUNDARY, form
 from tests.conftest import ROOT
@@ -70,15 +69,6 @@ def test_a_part_passes_or_fails_from_its_plan_and_its_points(calibrated: Visitor
     page = calibrated.get("/desk/certificate?name=plate-7").text
     assert "pass" in page.partition("</main>")[0].casefold()
     assert "part" in calibrated.get("/desk").text
-
-
-@pytest.mark.parametrize(("text", "file"), [
-    ('[job]\nid = "x"\n', '[job]\nid = "x"\n\n[recording]\nfile = "p.csv"\n'),
-    ('[recording]  # x\nfile = "old"\n\n[part]\na = "z"\n', '[recording]  # x\nfile = "p.csv"\n\n[part]\na = "z"\n'),
-    ('[recording]\nunit = "mm"\n', '[recording]\nfile = "p.csv"\nunit = "mm"\n'),
-])  # fmt: skip
-def test_nothing_but_the_file_of_points_is_changed(text: str, file: str) -> None:
-    assert with_points(text, "p.csv") == file
 
 
 @pytest.mark.long
