@@ -258,9 +258,10 @@ def show_recognised(recognised: Recognition) -> None:
 
 def show_proposed(recognised: Recognition, example: str, names: Iterable[str]) -> None:
     """How lengths were read, and the question where their lines lie, as options of the command."""
+    from cmm_uq.jobs.importing.lines import place_named
+
     show_recognised(recognised)
-    named = ((name, name if name in {"X", "Y", "Z"} else "X") for name in names)
-    lines = (f'--line "{name}=along {axis} from 100,200,300"' for name, axis in named)
+    lines = (f'--line "{name}={next(filter(None, place_named(name)))}"' for name in names)
     say(f"Read as: {example}")
     say(f"Where they lie: {' '.join(lines)}, or --plan plan.csv where they were planned")
 

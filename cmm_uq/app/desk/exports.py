@@ -18,6 +18,7 @@ from cmm_uq.base.points import Machine
 from cmm_uq.jobs.importing.answers import matching, path_of
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Recognition, Sheet, letters, sources_of
 from cmm_uq.jobs.importing.header import NAME, Header, text_of, understood
+from cmm_uq.jobs.importing.lines import place_named
 from cmm_uq.jobs.importing.recording import example, imported, points_of, tables_in
 from cmm_uq.jobs.importing.roles import said as role_said
 
@@ -76,6 +77,7 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
         if (asked := lines_asked(error)) is not None:
             recognised, found["example"], found["lines"] = asked
         found["problem"] = [error.where or "", error.problem, error.fix or ""]
+    found["lines"] = [(name, *place_named(name)) for name in found["lines"]]
     try:
         sheets, tables = tables_in(content, name, said)
     except CmmUqError:  # it is told already why nothing is read

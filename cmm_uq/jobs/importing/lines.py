@@ -287,3 +287,28 @@ def _axis_of(sheets: Sequence[Sheet]) -> str:
     """The axis that the first texts of a file name."""
     texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
     return next(filter(None, map(axis_in, texts)), "1")
+
+
+_FIGURE = r"\s*([-−]?\d+(?:\.\d+)?)\s*"
+_CORNER = re.compile(rf"\({_FIGURE}[/;,|]{_FIGURE}[/;,|]{_FIGURE}\)")
+_ALONG = re.compile(r"(?<![A-Za-z+−-])([XYZ]+)(?![A-Za-z\d]|\s*[=:\d])")
+_ACROSS = re.compile(rf"(?:[XYZ]\s*[=:]|(?<=[(/,;])\s*[XYZ]\s){_FIGURE}", re.I)
+
+
+def place_named(name: str) -> tuple[str, str]:
+    """What the name of a line says of its place, with ? for what it leaves open, empty where it says none; and an example.
+
+    Examples
+    --------
+    >>> place_named("Lage 1: (0/0/0) → (900/1600/800)")[0], place_named("parallel X (Y 800 / Z 400)")[0], place_named("Y axis")
+    ('from 0,0,0 to 900,1600,800', 'along X from ?,800,400', ('', 'along Y from 100,200,300'))
+    """
+    corners = [",".join(found.groups()).replace("−", "-") for found in _CORNER.finditer(name)]
+    along = _ALONG.findall(name)
+    axis = along[0] if len(along) == 1 and len(along[0]) == 1 else ""
+    across = {found[0].strip(" (/,;")[0].upper(): found[1].replace("−", "-") for found in _ACROSS.finditer(name)}
+    known = ["?" if one == axis else across.get(one, "?") for one in "XYZ"]
+    place = f"along {axis} from {','.join(known)}" if axis and {*known} != {"?"} else ""
+    if len(corners) == 2 and corners[0] != corners[1]:
+        place = f"from {corners[0]} to {corners[1]}"
+    return place, f"along {axis or 'X'} from 100,200,300"

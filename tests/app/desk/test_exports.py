@@ -27,7 +27,7 @@ def laid_out(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
 
 def placed(found: dict[str, Any], keys: dict[str, Any]) -> dict[str, Any]:
     return (
-        keys | {"lines": {name: f"along X from 0,{100 * i},0" for i, name in enumerate(found["lines"])}}
+        keys | {"lines": {name: f"along X from 0,{100 * i},0" for i, (name, *_) in enumerate(found["lines"])}}
         if found["lines"]
         else keys
     )

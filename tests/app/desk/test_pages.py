@@ -45,8 +45,10 @@ def certificate(stated: Verdicts = STATED, warnings: tuple[str, ...] = ("not sta
 
 
 @pytest.mark.parametrize(("shown", "told"), [
-    (read(), "say below how many rows in turn"), (read(problem=None, lines=["1", "X"]), "Where line X lies"),
-    (read(lines=["1"]), '<option value="plan.csv"'),
+    (read(), "say below how many rows in turn"),
+    (read(problem=None, lines=[("1", "", ""), ("X", "", "x")]), "Where line X lies"),
+    (read(lines=[("1", "", "")]), '<option value="plan.csv"'),
+    (read(lines=[("2", "along X from ?,8,4", "")]), 'value="along X from ?,8,4"'),
     (read(columns=[], rows=[], facts=[]), "Delete this export"),
     (run(), "Cancel"), (run(cancelled=True), "nothing was written"), (run(problem=("f", "is wrong", "")), "is wrong"),
     (certificate(), "U = 0.3 µm"), (certificate(Verdicts(), ()), "It states no conformity"),
