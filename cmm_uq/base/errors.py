@@ -70,7 +70,7 @@ class OutputError(CmmUqError):
 
 
 class NotInstalledError(CmmUqError):
-    """What is asked for needs a package of an extra; all else goes on without it."""
+    """What is asked for needs a package of an extra, or a file of its own, that is not here; all else goes on."""
 
 
 class Gathered:

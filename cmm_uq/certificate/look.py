@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import NotInstalledError
 
 INK = "#1b2328"  # text and outlines; 15.9 : 1 on white.
 MUTED = "#5a666e"  # secondary text, and what was before; 5.9 : 1 on white.
@@ -26,5 +26,5 @@ def template_folder() -> Path:
     for folder in (package / "templates", package.parent / "templates"):
         if (folder / "document.html").is_file():
             return folder
-    raise CmmUqError("the templates of the certificate are missing", where=str(package),
-                     fix="Install cmm-uq again, from a whole wheel")  # fmt: skip
+    raise NotInstalledError("the templates of the certificate are missing", where=str(package),
+                            fix="Install cmm-uq again, from a whole wheel")  # fmt: skip

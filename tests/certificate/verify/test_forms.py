@@ -19,6 +19,7 @@ from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.app.commands.certificates import again as computed_again, verification
 from cmm_uq.app.commands.certificates.verification import Verification
 from cmm_uq.app.commands.certificates.verify import verify
+from cmm_uq.base.errors import CmmUqError, NotInstalledError, OutputError
 from cmm_uq.certificate.verify.again import Again, beyond_sampling, by_other_kernels, differences
 from cmm_uq.certificate.verify.given import canonical
 from cmm_uq.jobs.job import Job
@@ -107,6 +108,15 @@ def test_an_input_with_a_forged_hash_is_computed_again(certificate: Path, again:
     found = verify([certificate], compute=compute)
     assert asked == [forged]
     assert any(one.place == "job.inputs_sha256.ballbar.csv" for one in found.inquiry.findings)
+
+
+@pytest.mark.parametrize("error", [OutputError("no space left"), NotInstalledError("the templates are missing")])
+def test_what_this_computer_lacks_is_no_finding_against_a_certificate(certificate: Path, error: CmmUqError) -> None:
+    def compute(given: object, job: Job) -> Again:
+        raise error
+
+    with pytest.raises(type(error)):
+        verify([certificate], compute=compute)
 
 
 def test_a_figure_written_otherwise_is_named_though_it_is_equal(certificate: Path, again: Again) -> None:

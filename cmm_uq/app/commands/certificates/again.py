@@ -27,7 +27,7 @@ from cmm_uq.app.commands.files import Stage, called, silent
 from cmm_uq.app.commands.laboratory.records import inputs_of
 from cmm_uq.app.commands.reading import in_language, job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, NotInstalledError, OutputError
 from cmm_uq.base.languages.translation import ENGLISH, code_of
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platform
@@ -295,6 +295,8 @@ def compute_again(
         if made == __version__:
             return compare_again(inquiry, given, computed)
         compare_figures(inquiry, given, computed, made)
+    except (NotInstalledError, OutputError):  # of this computer, not of the certificate
+        raise
     except CmmUqError as error:
         inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
     return False
