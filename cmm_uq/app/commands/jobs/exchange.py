@@ -138,8 +138,6 @@ def write_job_of_export(
     from cmm_uq.app.commands.jobs.new import check_empty, job_id, job_of_export, put_new
 
     check_empty(folder)
-    if not given.get("machine", {}).get("name"):
-        raise CmmUqError("the machine that was measured has no name", fix='Give --machine "…"')
     content = content_of(export, TABLE_BYTES, "Check its name")
     said = {key: value for key, value in keys.model_dump().items() if value not in (None, {})}
     name = job_id(folder, given)

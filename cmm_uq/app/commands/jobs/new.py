@@ -22,7 +22,7 @@ from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.parts.new import PART, Answers, part_files, part_of_answers, part_of_drawing
 from cmm_uq.app.commands.reading import job_of, unwritten
 from cmm_uq.artefacts import kind_named, names
-from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.files.toml_file import as_toml, nested, toml_of
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.plugins import naming_package
@@ -204,9 +204,13 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
 def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: str) -> dict[str, bytes]:  # noqa: A002
     """A new job of a recording that was measured: nothing of machine, artefact and limits but what is given."""
     found, begin = _begun(kind)
+    wrong = Gathered()
+    if not given.get("machine", {}).get("name"):
+        wrong.tell("the machine that was measured has no name", fix='Give --machine "…"')
     if "date" not in given.get("job", {}):
-        raise CmmUqError("an export does not say when it was measured", where="[job] date",
-                         fix="Give the date of measurement: --set job.date=2026-05-31")  # fmt: skip
+        fix = "Give the date of measurement: --set job.date=2026-05-31"
+        wrong.tell("an export does not say when it was measured", where="[job] date", fix=fix)
+    wrong.refuse()
     bare = replace(begin, artefact={}, conformity=None, test={})
     whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": nested(given.get("machine", {}))}
     if "effects" not in given.get("model", {}):  # what the export has no column for it cannot tell
