@@ -18,7 +18,8 @@ from dataclasses import replace
 from functools import cache
 from itertools import chain
 from math import ceil
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
@@ -39,14 +40,6 @@ def render_html(document: Document) -> str:
     return _environment().get_template("document.html").render(
         document=shown.as_data(), words=words, colour=COLOURS, picture=picture_share(shown), tight=tightness(shown)
     )  # fmt: skip
-
-
-def style_sheet(heading: str, banner: str, language: str) -> str:
-    """The style sheet of a page, which says what stands at head and foot of its printed pages."""
-    title, _, number = heading.partition(" ")
-    document = {"title": title, "number": number, "banner": banner, "language": language}
-    words = doc.view_words(code_of(language))
-    return _environment().get_template("document.css").render(document=document, words=words, colour=COLOURS)
 
 
 @cache
@@ -239,10 +232,13 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     content = {
         "document": fitted(document).as_data(), "smallest": SMALLEST, "words": doc.view_words(language),
         "colour": COLOURS, "date": document.date.isoformat() if document.date else EPOCH,
-        "attachments": [_attachment(name, data, language) for name, data in attachments.items()],
+        "attachments": [_attachment(i, name, language) for i, name in enumerate(attachments)],
         "logo": document.logo and {"format": document.logo.format, "data": list(document.logo.content)}, "missing": "",
     }  # fmt: skip
-    return _with_fallback(content, language)
+    with TemporaryDirectory() as root:
+        for i, data in enumerate(attachments.values()):
+            Path(root, str(i)).write_bytes(data)
+        return _with_fallback(content, language, root=root)
 
 
 def picture(template: str, content: Mapping[str, Any], language: Code = "en") -> bytes:
@@ -251,18 +247,14 @@ def picture(template: str, content: Mapping[str, Any], language: Code = "en") ->
     return _with_fallback({"document": content, "colour": COLOURS}, language, **how)
 
 
-def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
+def _attachment(place: int, name: str, language: Code) -> dict[str, Any]:
     suffix = PurePosixPath(name).suffix.lower()
     outcome, title = suffix in {".json", ".npz", ".xml"}, say("Input of this document: {name}", name=Verbatim(name))
     if outcome:
         title = say("Results in machine-readable form: {name}", name=Verbatim(name))
-    try:
-        body: str | list[int] = data.decode("utf-8")
-    except UnicodeDecodeError:
-        body = list(data)
     described, kind = str.__str__(said_in(title, language)), _TYPES.get(suffix, "application/octet-stream")
     relationship = "data" if outcome else "source"
-    return {"name": name, "data": body, "relationship": relationship, "type": kind, "description": described}
+    return {"name": name, "place": str(place), "relationship": relationship, "type": kind, "description": described}
 
 
 def _with_fallback(content: dict[str, Any], language: Code, **how: Any) -> bytes:
@@ -290,15 +282,15 @@ def _with_fallback(content: dict[str, Any], language: Code, **how: Any) -> bytes
 
 def _compile(
     content: Mapping[str, Any], folders: list[str], *, system_fonts: bool, template: str = "document.typ",
-    standards: Sequence[Any] = ("a-3a", "ua-1"), tagged: bool = True,
+    standards: Sequence[Any] = ("a-3a", "ua-1"), tagged: bool = True, root: str | None = None,
 ) -> bytes:  # fmt: skip
     import typst
 
-    return typst.compile(
+    return typst.compile(  # type: ignore[type-var]  # its stub wants a root of bytes beside a text of bytes
         (template_folder() / template).read_bytes(),
         font_paths=typst.Fonts(include_system_fonts=system_fonts, font_paths=folders),
         ignore_system_fonts=not system_fonts, sys_inputs={"input": json.dumps(content)}, pdf_standards=list(standards),
-        pdf_tags=tagged, timestamp=0,
+        pdf_tags=tagged, timestamp=0, root=root,
     )  # fmt: skip
 
 

@@ -89,6 +89,7 @@ _RANK, _ANOTHER = 1e-9, 1e-6
 _DISAGREES = 0.001  # probability with which any factor of a model that fits would be found to disagree
 
 Key = tuple[str, str]
+Ends = Sequence[tuple[float, float]]  # of a region along each axis, shares of the travels
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,8 +237,10 @@ def factor_regions(
     keys = [model.unknowns[i].key for i in named]
     units = [model.unknowns[i].unit for i in named]
 
+    ours, others = own[:, named], further[:, placed]
+
     def within(change: Floats) -> Floats:
-        return np.asarray(own[:, named] + further[:, placed] @ change[same].T)
+        return np.asarray(ours + others @ change[same].T)
 
     doubted = partial(drawn.doubted, model, named)
     over_all, parts = doubted(within(whole)), np.stack([doubted(within(one)) for one in eighths])
@@ -247,9 +250,7 @@ def factor_regions(
     of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
     scales = dict(zip(field.field.families, sizes.families.T, strict=True))
     u, change = np.array([one.u for one in quantities]), whole[same]
-    influence = influence_of(
-        over_all, u, scales, lambda name: further[:, placed] @ np.where(of_family == name, change, 0.0).T, {}
-    )
+    influence = influence_of(over_all, u, scales, lambda name: others @ np.where(of_family == name, change, 0.0).T, {})
     return FactorRegions(
         dict(zip(keys, quantities, strict=True)),
         {key: (float(low[i]), float(high[i])) for i, key in enumerate(keys) if str(units[i]) in _ANYWHERE},
@@ -275,7 +276,7 @@ def _chosen(effects: Sequence[Effect], columns: Ints) -> list[Effect]:
     return list(dict.fromkeys(of[i] for i in columns))
 
 
-def filling(machine: Machine, ends: Sequence[tuple[float, float]] = ((0.0, 1.0),) * 3) -> Floats:
+def filling(machine: Machine, ends: Ends = ((0.0, 1.0),) * 3) -> Floats:
     """(125, 3) readings that stand for a region, whose ends are shares of the travels: each for a part of the same size.
 
     Least squares of waves of the field at these are within 3 % (rms) of those over the whole region; at as many points
@@ -289,9 +290,7 @@ def filling(machine: Machine, ends: Sequence[tuple[float, float]] = ((0.0, 1.0),
     )
 
 
-def _moved(
-    machine: Machine, named: Sequence[Effect], others: Sequence[Effect], ends: Sequence[tuple[float, float]]
-) -> Floats:
+def _moved(machine: Machine, named: Sequence[Effect], others: Sequence[Effect], ends: Ends) -> Floats:
     """(k, j) by which named errors, as told of a region, change with a unit of each coefficient of others.
 
     Not a number for a named error that cannot be told there. ``ends``: of the region, in shares of the travels.
@@ -299,24 +298,21 @@ def _moved(
     readings = filling(machine, ends)
     one = np.ones(len(readings), dtype=np.int64)
     about = About(Points(machine.coordinates(readings), one, np.arange(len(readings)), one, machine))
-
-    def columns(effects: Sequence[Effect]) -> Floats:
-        found = [about.columns(effect).reshape(3 * len(readings), -1) for effect in effects]
-        return np.hstack([np.zeros((3 * len(readings), 0)), *found])
-
+    known, moving = ([about.columns(one).reshape(3 * len(readings), -1) for one in each] for each in (named, others))
     # a squareness that nobody named is none of the scales and rotations that were: what every machine has stands for itself
-    every, own = [one for one in others if one.everywhere and not one.of_artefact], {one.name for one in named}
-    beside = columns([one for one in every if one.name not in own])
-    known, offsets = columns(named), readings - readings.mean(axis=0)
+    own = {one.name for one in named}
+    every = zip(others, moving, strict=True)
+    beside = [seen for one, seen in every if one.everywhere and not one.of_artefact and one.name not in own]
+    k, offsets = sum(seen.shape[1] for seen in known), readings - readings.mean(axis=0)
     turned = np.cross(np.eye(3)[:, None], offsets).transpose(1, 2, 0)
-    rigid = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=2).reshape(len(known), 6)
-    design = np.hstack([known, rigid, beside])
+    rigid = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=2).reshape(-1, 6)
+    design = np.hstack([*known, rigid, *beside])
     length = np.linalg.norm(design, axis=0)
     length[length == 0] = 1.0
     inverse = np.linalg.pinv(design / length, rcond=_RANK) / length[:, None]
-    told = np.abs(inverse[: known.shape[1]] @ design - np.eye(*(known.shape[1], design.shape[1])))
-    found = inverse[: known.shape[1]] @ columns(others)
-    found[np.any(told * length[: known.shape[1], None] > _ANOTHER * length, axis=1)] = np.nan
+    told = np.abs(inverse[:k] @ design - np.eye(k, design.shape[1]))
+    found = inverse[:k] @ np.hstack([rigid[:, :0], *moving])
+    found[np.any(told * length[:k, None] > _ANOTHER * length, axis=1)] = np.nan
     return np.asarray(found)
 
 

@@ -112,7 +112,7 @@ class ProbedFeature:
         if raised:
             local = Raised(displacements, self._in_own_plane(normals), self._in_own_plane(self._offset))
             drawn = self._associated(local)
-            mean = self._offset.mean(axis=0) + displacements @ normals / self.n
+            mean = self._offset.mean(axis=0) + displacements @ normals.astype(displacements.dtype) / self.n
             return Features(self._slid(self._values(drawn), mean), drawn.form, points)
         if self.feature.kind == "point":
             values = np.zeros((len(displacements), VALUES))

@@ -303,11 +303,14 @@ def ways(
     plan: Plan, given: MeasurementConditions, draws: int = WAY_DRAWS, seed: int = 0, *,
     doubled: Doubled | None = None, planned: Virtual | None = None,
 ) -> list[Way]:  # fmt: skip
-    """The measurement as it is planned first, then what changes it, each alone.
-
-    Ways that the travel of the machine does not allow are left out.
-    """
+    """The measurement as it is planned first, then what changes it, each alone; what the travel forbids is left out."""
     first = Virtual(plan, given) if planned is None else planned
+    few, near = thinned(plan, given)
+    if few is not plan:  # some of thousands of points say by what part of u each is better
+        both = None if doubled is None else lambda: thinned(*doubled(), like=plan)
+        compared = ways(few, near, draws, seed, doubled=both, planned=Virtual(few, near, pilot=_PILOT))
+        part = spread(first, draws, seed) / np.maximum(compared[0].u, np.finfo(np.float64).tiny)
+        return [replace(one, u=part * one.u) for one in compared]
     found = [Way(say("as planned"), spread(first, draws, seed), draws)]
     for name, change in _changes(plan, given, doubled):
         with suppress(CmmUqError):  # beyond the travel
@@ -368,15 +371,13 @@ def _elsewhere(plan: Plan, given: MeasurementConditions, first: Virtual, draws: 
         return []
     read = first.places[0].points.carriages
     room = np.stack([travel[:2, 0] - read[:, :2].min(axis=0), travel[:2, 1] - read[:, :2].max(axis=0)])  # (2, axes)
-    few, near = thinned(plan, given)
-    place = first.places[0] if few is plan else AtPose(few, near, given.poses[0], first.known).condensed()
-    planned, best = _quick(place, seed), (1.0, given, np.zeros(2))
+    planned, best = _quick(first.places[0], seed), (1.0, given, np.zeros(2))
     for part in product((0.0, 0.5, 1.0), repeat=2):
         shift = room[0] + np.array(part) * (room[1] - room[0])
         moved = tuple(replace(p, translation_mm=p.translation_mm + np.append(shift, 0.0)) for p in given.poses)
         there = replace(given, poses=moved)
         with suppress(CmmUqError):
-            u = _quick(AtPose(few, replace(near, poses=moved), moved[0], first.known).condensed(), seed)
+            u = _quick(AtPose(plan, there, moved[0], first.known).condensed(), seed)
             ratio = float(np.mean(u / np.maximum(planned, np.finfo(np.float64).tiny)))
             best = (ratio, there, shift) if ratio < best[0] else best
     if best[1] is given:
@@ -389,12 +390,11 @@ def _elsewhere(plan: Plan, given: MeasurementConditions, first: Virtual, draws: 
 def _quick(place: AtPose, seed: int) -> Floats:
     """(c,) standard deviations of what would be read, to first order, of the same draws in every place."""
     random, parts = np.random.default_rng(seed), in_parts(place.measured.plan, _LOOKED_AT)
-    errors = [place.errors(place.drawn(random, n), inferred=False) for n in parts]
-    return np.asarray(np.concatenate(errors).std(axis=0))
+    errors = (place.errors(place.drawn(random, n), inferred=False) for n in parts)
+    return np.asarray(np.concatenate([*errors]).std(axis=0))
 
 
 def _turned(pose: PartPose, turn: Floats, plan: Plan) -> PartPose:
     """The part turned about its middle."""
     middle = pose.of(plan.points.mean(axis=0))
-    rotation = turn @ pose.rotation
-    return PartPose(rotation, middle - rotation @ plan.points.mean(axis=0))
+    return PartPose(turn @ pose.rotation, middle - turn @ pose.rotation @ plan.points.mean(axis=0))

@@ -266,9 +266,12 @@ def in_parts(plan: Plan, draws: int) -> list[int]:
     return [min(at_once, draws - first) for first in range(0, draws, at_once)]
 
 
-def thinned(plan: Plan, given: MeasurementConditions) -> tuple[Plan, MeasurementConditions]:
-    """The plan with some points for all of those of large features, by which places are compared; itself where it has none."""
-    steps = {name: max(1, (rows.stop - rows.start) // LARGE) for name, rows in plan.rows.items()}
+def thinned(plan: Plan, given: MeasurementConditions, like: Plan | None = None) -> tuple[Plan, MeasurementConditions]:
+    """The plan with some points for all of those of large features, by which ways are compared; itself where it has none.
+
+    ``like``: the plan whose large features it thins, where that is another one.
+    """
+    steps = {name: max(1, (rows.stop - rows.start) // LARGE) for name, rows in (like or plan).rows.items()}
     if max(steps.values()) == 1 or given.further:
         return plan, given
     kept = {name: np.arange(of.start, of.stop, steps[name]) for name, of in plan.rows.items()}

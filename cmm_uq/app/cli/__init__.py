@@ -50,7 +50,8 @@ def main() -> None:
 
 
 UNUSED: tuple[str, ...] = ("emcee.backends.hdf", "emcee.moves.kde", "mpl_toolkits.mplot3d", "numpy.f2py.f2py2e")
-UNUSED += ("scipy.linalg._decomp_interpolative", "scipy.optimize._shgo")
+UNUSED += ("scipy.linalg._decomp_interpolative", "scipy.optimize._linprog", "scipy.optimize._shgo")
+UNUSED += ("matplotlib.dviread", "matplotlib.projections.geo", "matplotlib.projections.polar", "matplotlib.tri")
 """Modules that libraries import and nothing here comes to: with what they import themselves, a tenth of a report's time."""
 
 

@@ -84,6 +84,7 @@ class Repeated:
     def __init__(self, kind: FeatureKind, points: ArrayLike) -> None:
         self.points = np.asarray(points, dtype=np.float64)
         self.placed: Placed = placed(kind, self.points)
+        self._flattened: tuple[Floats, ...] | None = None  # directions, offset, and what :meth:`_flat` makes of them
         if self.placed.condition > CONDITION:
             problem = f"{kind}: the nominal points hardly determine it (condition {self.placed.condition:.1e})"
             raise CmmUqError(problem, fix=f"Cover more of the {kind}")
@@ -117,21 +118,24 @@ class Repeated:
 
         ``None`` of all else, and where points move along it by as much as shows.
         """
-        along = self.placed.frame @ errors.directions.T
-        still = self.nominal + self.placed.frame @ errors.offset.T
         if self.placed.shape not in STRAIGHT or not len(errors):
             return None
-        design = np.vstack([np.ones(len(self.points)), still[:-1]])  # (k, n)
-        inverse = np.linalg.pinv(design)
-        state = errors.heights @ (along[-1][:, None] * inverse) + still[-1] @ inverse
+        known, dtype = self._flattened, errors.heights.dtype
+        if known is None or known[0] is not errors.directions or known[1] is not errors.offset:
+            along = self.placed.frame @ errors.directions.T
+            still = self.nominal + self.placed.frame @ errors.offset.T
+            design = np.vstack([np.ones(len(self.points)), still[:-1]])  # (k, n)
+            known = self._flattened = errors.directions, errors.offset, along, still, design, np.linalg.pinv(design)
+        along, still, design, inverse = known[2:]
+        state = errors.heights @ (along[-1][:, None] * inverse).astype(dtype) + still[-1] @ inverse
         sideways = np.abs(along[:-1]).max() * max(errors.heights.max(), -errors.heights.min())
         if sideways * np.abs(state[:, 1:]).max() > SETTLED / 100:
             return None
-        lines, heights = np.insert(-state, 0, 1.0, axis=1), np.vstack([still[-1], design])
+        lines, heights = np.insert(-state, 0, 1.0, axis=1).astype(dtype), np.vstack([still[-1], design]).astype(dtype)
         form = np.empty(len(state))
         for rows in self._blocks(len(errors), 10 * BLOCK):
             d = lines[rows] @ heights
-            d += along[-1] * errors.heights[rows]
+            d += along[-1].astype(dtype) * errors.heights[rows]
             form[rows] = np.ptp(d, axis=1) / np.sqrt(1 + np.sum(state[rows, 1:] ** 2, axis=1))
         return self._drawn(state, form)
 

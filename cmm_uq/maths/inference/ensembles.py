@@ -1,10 +1,11 @@
-"""Several ensembles of emcee on one density, side by side in one sampler, until the autocorrelation time says enough.
+"""Several ensembles on one density, side by side, with moves of emcee, until the autocorrelation time says enough.
 
 The walkers move in coordinates whitened by an approximation of the density. Walkers of one ensemble are not independent, so
 the ensembles, each with random numbers of its own, are compared with each other. Most steps are independence proposals from
 the approximation; differential-evolution steps repair what it misses. (emcee's snooker move is not used: its normalisation is
 wrong in release 3.1.6.) Independence proposals do not depend on where the walkers are, so those of all ensembles are drawn
-ahead, up to each one's next differential-evolution step, and the density is asked for all of them at once.
+ahead, up to each one's next differential-evolution step, and the density is asked for all of them at once; so it is for the
+differential-evolution steps of several ensembles.
 
 Chains are worth as many independent draws as the bulk effective sample size of Vehtari, Gelman, Simpson, Carpenter and Bürkner
 (2021) says: "Rank-normalization, folding, and localization: an improved R-hat", Bayesian Analysis 16(2), sections 3.2 and 4.3.
@@ -15,11 +16,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.proposals import LogDensity, Numbers
@@ -31,69 +31,74 @@ SHARES = (0.9, 0.1)  # how often the step is an independence proposal, and one o
 _AHEAD = 40  # most steps that are drawn ahead
 
 
-class _Independent(NamedTuple):
-    """Independence proposals (w, d), logarithms of what they come from and of the density, and what decides on them, (w,)."""
-
-    proposed: Floats
-    log_proposal: Floats
-    log_density: Floats
-    uniform: Floats
-    log_before: Floats = np.zeros(0)  # of the proposal, where the walkers are
-
-    def rand(self, _: int) -> Floats:
-        """What emcee takes from a source of random numbers."""
-        return self.uniform
+# of independence: proposals (w, d), logarithms of the density, of what they come from and of what decides on them, (w,)
+Step = tuple[Floats, Floats, Floats, Floats]
 
 
 class SideBySide:
-    """A move of emcee's, with a proposal that is roughly the density, and random numbers of each ensemble."""
+    """Ensembles of walkers (e, w, d), each with random numbers of its own, and a proposal that is roughly the density."""
 
-    def __init__(self, proposal: Proposes, randoms: Sequence[Any]) -> None:
-        from emcee.moves import DEMove, MHMove
+    def __init__(self, density: LogDensity, proposal: Proposes, randoms: Sequence[Any], begin: Floats) -> None:
+        from emcee.moves import DEMove
 
-        self._proposal, self._randoms = proposal, randoms
-        self._independence, self._differences = MHMove(self._proposed), DEMove()
-        self._ahead: tuple[deque[_Independent | None], ...] = tuple(deque() for _ in randoms)
-        self._at, self._log_proposal = np.zeros((0, 0)), np.zeros(0)
+        self._density, self._proposal, self._randoms, self._at = density, proposal, randoms, begin.copy()
+        every = begin.reshape(-1, begin.shape[2])
+        self._log_density, self._log_proposal = (
+            of(every).reshape(begin.shape[:2]) for of in (density, proposal.log_density)
+        )
+        self._differences = DEMove()
+        self._differences.setup(every)
+        self._ahead: tuple[deque[Step | None], ...] = tuple(deque() for _ in randoms)
 
-    def propose(self, model: Any, state: Any) -> tuple[Any, NDArray[np.bool_]]:
-        """One step of every ensemble: where the walkers are then, and which of them moved."""
-        accepted = np.zeros(len(state.coords), dtype=bool)
-        of_ensemble = np.arange(len(accepted)).reshape(len(self._randoms), -1)
-        self._draw_ahead(model, of_ensemble.shape[1])
-        if not np.array_equal(self._at, state.coords):
-            self._log_proposal = self._proposal.log_density(state.coords)
-        chosen = [steps.popleft() for steps in self._ahead]
-        for i, step in enumerate(chosen):
-            if step is None:
-                rows = of_ensemble[i]
-                self._move(self._differences, model._replace(random=self._randoms[i]), state, rows, accepted)
-                moved = rows[accepted[rows]]
+    def steps(self, count: int) -> Floats:
+        """Where the walkers are after each of so many steps, (e, count, w, d)."""
+        found, done = np.empty((len(self._at), count, *self._at.shape[1:])), [0] * len(self._at)
+        while min(done) < count:
+            self._draw_ahead()
+            differing = list[int]()
+            for i, steps in enumerate(self._ahead):
+                while steps and done[i] < count and (not differing or differing[-1] != i):
+                    if (step := steps.popleft()) is None:
+                        differing.append(i)
+                    else:
+                        self._independent(i, *step)
+                        found[i, done[i]] = self._at[i]
+                        done[i] += 1
+            self._differ(differing)
+            for i in differing:
+                found[i, done[i]] = self._at[i]
+                done[i] += 1
+        return found
+
+    def _independent(self, i: int, at: Floats, log: Floats, log_proposal: Floats, log_uniform: Floats) -> None:
+        """Metropolis and Hastings: an ensemble's walkers to where they are proposed, or not."""
+        accepted = log_uniform < log - self._log_density[i] + (self._log_proposal[i] - log_proposal)
+        for held, new in ((self._at, at), (self._log_density, log), (self._log_proposal, log_proposal)):
+            held[i][accepted] = new[accepted]
+
+    def _differ(self, which: Sequence[int]) -> None:
+        """A step of differential evolution of some ensembles, as emcee proposes it: each half by the other."""
+        halves = [np.arange(self._at.shape[1]) % 2 for _ in which]
+        for half, i in zip(halves, which, strict=True):
+            self._randoms[i].shuffle(half)
+        for part in (0, 1) if halves else ():
+            rows = [np.flatnonzero(half == part) for half in halves]
+            proposed = [
+                self._differences.get_proposal(self._at[i][own], [self._at[i][half != part]], self._randoms[i])[0]
+                for i, own, half in zip(which, rows, halves, strict=True)
+            ]
+            each = np.split(self._density(np.concatenate(proposed)), np.cumsum([len(own) for own in rows])[:-1])
+            for i, own, at, log in zip(which, rows, proposed, each, strict=True):
+                accepted = log - self._log_density[i, own] > np.log(self._randoms[i].rand(len(own)))
+                moved = own[accepted]
+                self._at[i, moved], self._log_density[i, moved] = at[accepted], log[accepted]
                 if len(moved):
-                    self._log_proposal[moved] = self._proposal.log_density(state.coords[moved])
-        if independent := [step for step in chosen if step is not None]:
-            rows = of_ensemble[[step is not None for step in chosen]].ravel()
-            each = zip(*(step[:4] for step in independent), strict=True)
-            several = _Independent._make([*map(np.concatenate, each), self._log_proposal[rows]])
-            known = model._replace(random=several, compute_log_prob_fn=lambda _: (several.log_density, None))
-            self._move(self._independence, known, state, rows, accepted)
-            self._log_proposal[rows] = np.where(accepted[rows], several.log_proposal, several.log_before)
-        self._at = state.coords.copy()
-        return state, accepted
+                    self._log_proposal[i, moved] = self._proposal.log_density(at[accepted])
 
-    def _move(self, move: Any, model: Any, state: Any, rows: NDArray[np.int64], accepted: NDArray[np.bool_]) -> None:
-        """A move of emcee's for some of the walkers, in their place."""
-        part = type(state)(state.coords[rows], log_prob=state.log_prob[rows])
-        part, accepted[rows] = move.propose(model, part)
-        state.coords[rows], state.log_prob[rows] = part.coords, part.log_prob
-
-    def tune(self, state: Any, accepted: NDArray[np.bool_]) -> None:
-        """Nothing: the step stays as it is."""
-
-    def _draw_ahead(self, model: Any, walkers: int) -> None:
+    def _draw_ahead(self) -> None:
         """Next steps of each ensemble that has none: independent ones, and ``None`` for one of differential evolution."""
-        drawn: list[tuple[deque[_Independent | None], Numbers, Floats]] = []
-        differences = []
+        drawn: list[tuple[deque[Step | None], Numbers, Floats]] = []
+        differences, walkers = [], self._at.shape[1]
         for steps, random in zip(self._ahead, self._randoms, strict=True):
             for _ in range(0 if steps else _AHEAD):
                 if random.random_sample() >= SHARES[0]:  # its random numbers are the next
@@ -103,16 +108,12 @@ class SideBySide:
         if drawn:
             each = zip(*(numbers for _, numbers, _ in drawn), strict=True)
             z = self._proposal.made(tuple(np.concatenate(column) for column in each))
-            log_proposal, log_density = self._proposal.log_density(z), model.compute_log_prob_fn(z)[0]
+            log_proposal, log_density = self._proposal.log_density(z), self._density(z)
             for i, (steps, _, uniform) in enumerate(drawn):
                 own = slice(i * walkers, (i + 1) * walkers)
-                steps.append(_Independent(z[own], log_proposal[own], log_density[own], uniform))
+                steps.append((z[own], log_density[own], log_proposal[own], np.log(uniform)))
         for steps in differences:
             steps.append(None)
-
-    def _proposed(self, _: Floats, drawn: _Independent) -> tuple[Floats, Floats]:
-        """Proposals that do not depend on where the walkers are, with their Hastings ratio."""
-        return drawn.proposed, drawn.log_before - drawn.log_proposal
 
 
 ENSEMBLES, WALKERS = 4, 32
@@ -177,15 +178,14 @@ def run_ensembles(
     def whitened(z: Floats) -> Floats:
         return density(proposal.parameters(z))
 
-    begin = np.vstack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
-    move = SideBySide(proposal, _randoms(seed))
-    sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
-    state, steps, slow = sampler.run_mcmc(begin, burn_in, store=False), 0, 0
+    begin = np.stack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
+    sampler, steps, slow = SideBySide(whitened, proposal, _randoms(seed), begin), 0, 0
+    sampler.steps(burn_in)
+    chains = np.empty((ENSEMBLES, 0, walkers, d))
     while True:
-        state = sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
+        chains = np.concatenate([chains, sampler.steps(steps_at_once)], axis=1)
         steps += steps_at_once
-        chains = np.ascontiguousarray(sampler.get_chain().reshape(steps, ENSEMBLES, walkers, d).swapaxes(0, 1))
-        short = min(steps / 50, steps * len(begin) / effective_samples) if steps < MOST_STEPS else np.inf
+        short = min(steps / 50, steps * ENSEMBLES * walkers / effective_samples) if steps < MOST_STEPS else np.inf
         slow, time, effective = _effective_samples(chains, slow, short)
         if progress:
             progress(min(1.0, effective / effective_samples))

@@ -79,7 +79,7 @@ class PartCause(ABC):
         """(N, m, 3) displacements of m points for coefficients (N, K), mm."""
 
     def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
-        """(N, m) of these along normals (m, 3); (N, 1) of zero where it moves none."""
+        """(N, m) of these along normals (m, 3), of seven digits at least; (N, 1) of zero where it moves none."""
         return np.asarray(np.einsum("nmi,mi->nm", self.moved(coefficients, rows), normals))
 
 
@@ -104,7 +104,7 @@ class CommonCause(PartCause):
         left, right = self._raising[key]
         if not len(right):
             return np.zeros((len(coefficients), 1))
-        return np.asarray((coefficients @ left) @ right)
+        return np.asarray((coefficients @ left).astype(right.dtype) @ right)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -141,14 +141,13 @@ class PointScatter(PartCause):
 
 
 def _few(heights: Floats) -> tuple[Floats, Floats]:
-    """Factors (K, r) and (r, m) of heights (K, m), of as few components as these have where they are many."""
-    heights = np.asarray(heights)
+    """Factors (K, r) and (r, m) of heights (K, m), of as few components as these have where they are many; of seven digits."""
     if len(heights) <= _FACTORED:
         acting = np.flatnonzero(np.abs(heights).max(axis=1, initial=0.0) > 0)
-        return np.eye(len(heights))[:, acting], heights[acting]
+        return np.eye(len(heights))[:, acting], heights[acting].astype(np.float32)
     values, vectors = np.linalg.eigh(heights @ heights.T)
     left = vectors[:, values > heights.shape[1] * _UNSEEN_MM**2 + _ROUNDING * values[-1]]
-    return left, np.asarray(left.T @ heights)
+    return left, np.asarray(left.T @ heights, dtype=np.float32)
 
 
 def normal(sd: ArrayLike) -> Draw:
@@ -267,7 +266,8 @@ class CondensedCause(PartCause):
         start, stop, _ = rows.indices(len(self.normals))
         first, last = np.searchsorted(self.single, [start, stop]).tolist()
         skipped = len(self.vectors) * len(self.whole)
-        return coefficients[:, skipped + first : skipped + last] * self._sizes[first:last], self.single[first:last]
+        sizes = self._sizes[first:last].astype(coefficients.dtype)
+        return coefficients[:, skipped + first : skipped + last] * sizes, self.single[first:last]
 
 
 def together(causes: Sequence[PartCause]) -> list[PartCause]:
@@ -275,13 +275,13 @@ def together(causes: Sequence[PartCause]) -> list[PartCause]:
     alone = [one for one in causes if isinstance(one, CondensedCause) and len(one.single) == len(one.factors)]
     if len(alone) < 2:
         return list(causes)
-    first, squares = alone[0], [one._sizes**2 for one in alone]
+    first, squares = alone[0], [(one._sizes**2).astype(np.float32) for one in alone]
 
     def draw(random: np.random.Generator, n: int) -> Floats:
-        variance = np.zeros((n, len(first.single)))
+        variance = np.zeros((n, len(first.single)), dtype=np.float32)
         for one, square in zip(alone, squares, strict=True):
             variance += square if one.scale is None else square * (np.asarray(one.scale(random, n)) ** 2 @ one.share)
-        return np.asarray(np.sqrt(variance, out=variance) * random.standard_normal(variance.shape))
+        return np.asarray(np.sqrt(variance, out=variance) * random.standard_normal(variance.shape, dtype=np.float32))
 
     one = replace(first, draw=draw, vectors=first.normals[None], scale=None, share=np.ones((1, 1)))
     return [*(cause for cause in causes if cause not in alone), one]

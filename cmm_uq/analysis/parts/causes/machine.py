@@ -15,10 +15,9 @@ effective size and offset, and so do not act on the part again. The sphere is pr
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
 from cmm_uq.analysis.machine.state import MachineState, Unmodelled
@@ -71,16 +70,21 @@ def styli(plan: Plan, pose: PartPose) -> list[PartCause]:
             factors = (f"tip offset {stylus.name}",) * len(AXES)
             found.append(CommonCause(name=STYLUS, factors=factors, draw=normal(stylus.u_offset_um), basis=basis))
         if stylus.lobing_um:
-            variance = (MICROMETRE * stylus.lobing_um) ** 2
-            lobed = field_components(partial(_lobing, variance, plan.normals, its), np.where(its, variance, 0.0))
-            found.append(field_along(STYLUS, f"lobing {stylus.name}", lobed, plan.normals))
+            found.append(field_along(STYLUS, f"lobing {stylus.name}", _lobed(plan, place), plan.normals))
     return found
 
 
-def _lobing(variance: float, normals: Floats, its: NDArray[np.bool_], some: slice) -> Floats:
-    cosine = np.clip(normals[some] @ normals.T, -1.0, 1.0)
-    mean = np.mean([eval_legendre(degree, cosine) for degree in DEGREES], axis=0)
-    return np.asarray(variance * mean * np.outer(its[some], its))
+@lru_cache(maxsize=8)
+def _lobed(plan: Plan, place: int) -> Floats:
+    """(K, n) of the lobing of one stylus: the same wherever the part lies, and so looked up."""
+    variance, its = (MICROMETRE * plan.styli[place].lobing_um) ** 2, plan.stylus_of == place
+
+    def lobing(some: slice) -> Floats:
+        cosine = np.clip(plan.normals[some] @ plan.normals.T, -1.0, 1.0)
+        mean = np.mean([eval_legendre(degree, cosine) for degree in DEGREES], axis=0)
+        return np.asarray(variance * mean * np.outer(its[some], its))
+
+    return field_components(lobing, np.where(its, variance, 0.0))
 
 
 def directions() -> Floats:
