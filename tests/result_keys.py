@@ -424,6 +424,7 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = {
         "decision.words": ("", "The same in words, with its edition."),
         "decision.prior": ("", "What was known beforehand, as the job says."),
         "decision.outcome": ("", "Of the part: the worst of all."),
+        "decision.withheld": ("", "Why nothing is called conforming, whatever its value; where there is a reason."),
         "decision.probability_all_conform": ("", "Probability that all limits are kept at once."),
         **{key: ("", sentence) for key, sentence in RESULTS.items() if key.startswith("verdicts.")},
         "budget.characteristics": ("", "Names of the columns of the shares."),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning.candidates import RelocatedCandidates, VolumeCandidates, across_planes
@@ -39,6 +40,7 @@ LEAST_POINTS = 3
 
 # extent across over extent along below which points lie on one line and leave the plane free to turn about it
 _ON_A_LINE = 1e-3
+_DEGREE = 6  # of a surface's form, as of a sphere's
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,17 @@ class PlaneSurface(Artefact):
         self._refuse_no_plane(where)
         if self.offset is not None:
             self._refuse_no_side(self.offset, where)
+        if not self.form:
+            self.exact = ((say("The form of the surface is not stated"), np.ones(len(contact), dtype=bool)),)
+
+    def form_patterns(self) -> Floats:
+        """Products of Legendre polynomials of both directions in each plane, of degrees 2 to 6 together."""
+        touched = self.points.xyz[self.rows[:, 0]]
+        across = np.einsum("ni,nij->nj", touched - self.placings.means(touched), self._axes(touched)[:, :, 1:])
+        reach = np.array([np.abs(across[own]).max(axis=0) for own in self.placings.rows])[self.placings.index]
+        powers = legendre.legvander(across / reach, _DEGREE)
+        chosen = [(i, j) for i in range(_DEGREE + 1) for j in range(_DEGREE + 1) if 2 <= i + j <= _DEGREE]
+        return np.column_stack([powers[:, 0, i] * powers[:, 1, j] for i, j in chosen])
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         contact = self.rows[:, 0]

@@ -20,13 +20,13 @@ from cmm_uq.base.units import MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section, section
 from cmm_uq.certificate.origin import CERTIFICATE
 from cmm_uq.certificate.wording import NO_FACTOR, expanded
-from cmm_uq.jobs.chain import TraceabilityChain, certified_on_this_machine, chain_of, dates_out_of_order
+from cmm_uq.jobs.chain import TraceabilityChain, chain_of, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.recording.beside import ShortGaugeFacts
 from cmm_uq.jobs.recording.compared import OF_POINTS
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts, Traceability
 from cmm_uq.jobs.tables.identification import MEASURED, Identification, Laboratory, ReplacedCertificate
-from cmm_uq.jobs.tables.length_formula import Growing, factor_of
+from cmm_uq.jobs.tables.length_formula import Growing, factor_of, students
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.physics.catalogue import every
@@ -118,6 +118,8 @@ def stated_uncertainty(facts: ArtefactFacts, points: Points) -> Text:
     factor = NOTHING
     if facts.k is not None:
         factor = say("k = {k}", k=figure(facts.k, 10))
+        if facts.degrees_of_freedom is None and students(facts.k):
+            factor = say("{factor}, taken as Student's t for 95 %", factor=factor)
     elif facts.degrees_of_freedom is not None and facts.U_um is not None:
         factor = say("k = {k}", k=figure(factor_of(None, facts.degrees_of_freedom) or 0.0, 3))
     if facts.degrees_of_freedom is not None:
@@ -370,7 +372,7 @@ def contradictions(job: Job) -> tuple[Text, ...]:
         "measurements have in common are not seen here.",
         key=messages.at_key("[artefact.certificate] machine"),
     )
-    return (*((circular,) if certified_on_this_machine(job.facts) else ()), *dates_out_of_order(job))
+    return (*((circular,) if job.facts.certified_on_this_machine else ()), *dates_out_of_order(job))
 
 
 def not_stated(lacking: Iterable[Requirement]) -> list[Text]:

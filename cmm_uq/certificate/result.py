@@ -287,7 +287,7 @@ class Result:
     @cached_property
     def verdicts(self) -> Verdicts:
         """All statements of conformity, and the gravest: those of standards, then (first) parameters with a tolerance."""
-        tolerances, against = self.job.facts.model.tolerances, [what for what, _ in self.job.facts.circumstances.lapsed]
+        tolerances, against = self.job.facts.model.tolerances, [what for what, _ in self.job.circumstances.lapsed]
         if self.job.facts.recording.measurements_aside:
             against.insert(0, say("it is estimated without the measurements that the laboratory set aside"))
         found = [by_standard(statement) for statement in self.statements]

@@ -10,17 +10,25 @@ stated, and the measurement lies between both dates, the first and the last day 
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, day, names, say, semicolons, sentences
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, day, say, semicolons, sentences
 from cmm_uq.jobs.acquired import ARTEFACT
-from cmm_uq.jobs.columns import in_words
-from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.job import CIRCULAR, Job
 from cmm_uq.jobs.reports import AS_FOUND
-from cmm_uq.jobs.tables.artefact import ACCREDITED, CONSENSUS, IN_HOUSE, MATERIAL, NATIONAL, OTHER, Traceability
-from cmm_uq.jobs.tables.identification import MEASURED
+from cmm_uq.jobs.tables.artefact import (
+    ACCREDITED,
+    CONSENSUS,
+    IN_HOUSE,
+    MATERIAL,
+    NATIONAL,
+    OTHER,
+    Traceability,
+    nameless,
+)
+from cmm_uq.jobs.tables.identification import MEASURED, NO_DATE
 
 # what a statement of traceability says; the last where nothing that is certified enters
 Claim = Literal["traceable", "by evidence", "not shown", "none needed"]
@@ -93,10 +101,10 @@ class Link:
             (accredited and not chain.accredited_by.strip(), "accredited_by", say("who accredited the issuer is not stated")),
             (chain.date is None, "date", say("the date of the certificate is not stated")),
             (chain.until is None, "due", say("until when the calibration holds is not stated")),
-            *((True, key, what) for what, key in chain.denials(self.day)),
             (bool(self.another), "serial", say("the temperatures were read from {serial}", serial=Verbatim(self.another))),
         )  # fmt: skip
         yield from ((what, f"{self.table} {key}") for lacks, key, what in found if lacks)
+        yield from chain.denials(self.day, self.table)
 
     @property
     def sentence(self) -> Text:
@@ -162,8 +170,7 @@ class TraceabilityChain:
     def lacks(self) -> tuple[Lack, ...]:
         """All that a claim of traceability lacks."""
         if self.said == OWN_MACHINE:
-            lack = say("traceability (artefact: a certificate from another machine)")
-            return ((lack, "[artefact.certificate] machine"),)
+            return (CIRCULAR,)
         return tuple(
             (say("traceability ({what}: {lack})", what=link.what, lack=lack), key)
             for link in self.links for lack, key in link.lacks()
@@ -185,7 +192,7 @@ def chain_of(job: Job, read: Collection[str] = ()) -> TraceabilityChain:
     if not links:
         return TraceabilityChain((), UNCALIBRATED, "none needed")
     links += _temperatures(job, read)
-    if facts.artefact.traced and certified_on_this_machine(facts):
+    if facts.artefact.traced and facts.certified_on_this_machine:
         return TraceabilityChain((), OWN_MACHINE, "not shown")
     claims = {link.claim for link in links}
     worst: Claim = "not shown" if "not shown" in claims else "by evidence" if "by evidence" in claims else "traceable"
@@ -201,18 +208,12 @@ def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
     instruments = [] if job.acquired is None else job.acquired.said.instruments  # that a live recording is from
     for number, one in enumerate(facts.thermometer, 1):
         if own := sorted(columns & {*one.columns}):
-            named = commas(names(filter(None, (one.name, one.serial))))
-            what = say("thermometer {named}", named=named) if named else _nameless(own)
             taken = (each.serial for each in instruments if not {*each.columns.values()}.isdisjoint(own))
             another = next((serial for serial in taken if serial and serial != one.serial), "")
-            yield Link(what, f"[[thermometer]] {number} certificate", one.certificate, date, True, another)
+            yield Link(one.called(own), f"[[thermometer]] {number} certificate", one.certificate, date, True, another)
     known = {name for one in facts.thermometer for name in one.columns}
     for name in sorted(columns - known):
-        yield Link(_nameless([name]), "[[thermometer]] certificate", None, date, True)
-
-
-def _nameless(columns: Iterable[str]) -> Text:
-    return say("thermometer of the {column}", column=commas(map(in_words, columns)))
+        yield Link(nameless([name]), "[[thermometer]] certificate", None, date, True)
 
 
 def holds_on(chain: Traceability, day: dt.date) -> bool:
@@ -220,31 +221,23 @@ def holds_on(chain: Traceability, day: dt.date) -> bool:
     return chain.until is not None and (chain.date or day) <= day <= chain.until
 
 
-def certified_on_this_machine(facts: JobFile) -> bool:
-    """Whether the artefact's certificate comes from the machine that the artefact now tests."""
-    chain, machine = facts.artefact.certificate, facts.machine
-    own = {name.strip().casefold() for name in (machine.name, machine.serial) if name.strip()}
-    return chain is not None and chain.machine.strip().casefold() in own
-
-
 def dates_out_of_order(of: Job) -> tuple[Text, ...]:
-    """Dates of which one must not be earlier than the other and is, among them an artefact that was due on the day."""
-    job, chain = of.facts.job, of.facts.artefact.certificate or Traceability()
+    """Dates of which one must not be earlier than the other and is, among them certificates that did not hold on the day."""
+    job = of.facts.job
+    date = None if job.date == NO_DATE else job.date
     found = None if of.as_found is None else of.as_found.job.date
     ordered: tuple[tuple[dt.date | None, dt.date | None, Text, str], ...] = (
-        (job.issued, job.date, say("issued before it was measured"), "[job] issued"),
-        (job.date, chain.date, say("the artefact was certified after it was measured with"), "[artefact.certificate] date"),
-        (chain.until, job.date, say("the artefact was due for calibration before this"), "[artefact.certificate] due"),
-        (chain.until, chain.date, say("the artefact's certificate was due before its date"), "[artefact.certificate] due"),
-        (job.date, job.received, say("it was measured before it was received"), "[job] received"),
+        (job.issued, date, say("issued before it was measured"), "[job] issued"),
+        (date, job.received, say("it was measured before it was received"), "[job] received"),
         (job.issued, job.replaces.date if job.replaces else None, say("issued before the certificate that it replaces"),
          "[job.replaces] date"),
-        (job.date, found, say("the machine was found as it was after it was left"), AS_FOUND),
-        (job.recalibration_agreed, job.date, say("the next calibration is agreed for a day before this one"),
+        (date, found, say("the machine was found as it was after it was left"), AS_FOUND),
+        (job.recalibration_agreed, date, say("the next calibration is agreed for a day before this one"),
          "[job] recalibration_agreed"),
     )  # fmt: skip
-    return tuple(
-        say("Dates out of order: {what}, {first} against {second}{key}.", what=what, first=day(first), second=day(second),
-            key=at_key(at))
+    wrong = [
+        (commas((what, say("{first} against {second}", first=day(first), second=day(second)))), at)
         for first, second, what, at in ordered if first and second and first < second
-    )  # fmt: skip
+    ]  # fmt: skip
+    denied = [(commas((what, lack)), at) for what, lack, at in (of.denials() if date else ())]
+    return tuple(say("Dates out of order: {what}{key}.", what=what, key=at_key(at)) for what, at in (*denied, *wrong))

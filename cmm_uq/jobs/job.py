@@ -22,7 +22,7 @@ from cmm_uq.jobs.importing.format import ImportKeys, Recognition
 from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.recording.compared import Prediction, SimulationFacts
 from cmm_uq.jobs.reports import AsFound
-from cmm_uq.jobs.tables.artefact import ArtefactFacts, ThermometerFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, ThermometerFacts, Traceability
 from cmm_uq.jobs.tables.conformity import (
     Circumstances,
     ClausesForm,
@@ -68,7 +68,7 @@ class JobFacts(Identification):
             )
 
 
-NO_DATE = dt.date(1970, 1, 1)  # of a job that says none: the clock is never read
+CIRCULAR = say("traceability (artefact: a certificate from another machine)"), "[artefact.certificate] machine"
 
 
 class SetAside(JobTable):
@@ -184,16 +184,15 @@ class JobFile(JobTable):
         return Circumstances(
             self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None,
             cmc=self.laboratory.cmc,
-            set_aside={entry.measurement: entry.reason for entry in self.recording.set_aside}, lapsed=tuple(self._lapsed()),
+            set_aside={entry.measurement: entry.reason for entry in self.recording.set_aside},
         )  # fmt: skip
 
-    def _lapsed(self) -> Iterator[tuple[Text, str]]:
-        """Certificates of lengths that did not hold on the day of the measurement: why, and the key that says so."""
-        certified = ((self.artefact if self.artefact.traced else None, say("artefact"), "artefact"),
-                     (self.short_gauge, say("short gauge"), "short_gauge"))  # fmt: skip
-        for of, what, table in certified:
-            for lack, key_of in () if of is None or of.certificate is None else of.certificate.denials(self.job.date):
-                yield say("traceability ({what}: {lack})", what=what, lack=lack), f"[{table}.certificate] {key_of}"
+    @property
+    def certified_on_this_machine(self) -> bool:
+        """Whether the artefact's certificate comes from the machine that the artefact now tests."""
+        chain, machine = self.artefact.certificate, self.machine
+        own = {name.strip().casefold() for name in (machine.name, machine.serial) if name.strip()}
+        return chain is not None and chain.machine.strip().casefold() in own
 
     @model_validator(mode="before")
     @classmethod
@@ -264,7 +263,30 @@ class Job:
         """
         stated = self.facts.circumstances
         uncertainty = stated.uncertainty if self.acquired is None else self.acquired.with_joined(stated.uncertainty)
-        return replace(stated, short_gauge=self.short_gauge, clauses=self.clauses, uncertainty=uncertainty)
+        lapsed = tuple(
+            (say("traceability ({what}: {lack})", what=what, lack=lack), key) for what, lack, key in self.denials()
+        )
+        if self.facts.artefact.traced and self.facts.certified_on_this_machine:
+            lapsed += (CIRCULAR,)
+        return replace(
+            stated, short_gauge=self.short_gauge, clauses=self.clauses, uncertainty=uncertainty, lapsed=lapsed
+        )
+
+    def denials(self) -> Iterator[tuple[Text, Text, str]]:
+        """Certificates that the results rest on and that did not hold on the day: of what, why, and the key that says so."""
+        facts, recorded = self.facts, {*self.points.columns}
+        stated: list[tuple[Text, Traceability | None, str]] = [
+            (say("artefact"), facts.artefact.certificate if facts.artefact.traced else None, "[artefact.certificate]")
+        ]
+        if facts.short_gauge is not None:
+            stated.append((say("short gauge"), facts.short_gauge.certificate, "[short_gauge.certificate]"))
+            recorded |= set() if self.short_gauge is None else {*self.short_gauge.points.columns}
+        for number, one in enumerate(facts.thermometer, 1):
+            if own := sorted(recorded & {*one.columns}):
+                stated.append((one.called(own), one.certificate, f"[[thermometer]] {number} certificate"))
+        for what, certificate, table in stated:
+            for lack, at in () if certificate is None else certificate.denials(facts.job.date, table):
+                yield what, lack, at
 
     @property
     def origin(self) -> Origin:

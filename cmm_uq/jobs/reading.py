@@ -22,7 +22,7 @@ from cmm_uq.jobs.importing.documents import DCC
 from cmm_uq.jobs.importing.encodings import begins_with
 from cmm_uq.jobs.importing.format import HEAD, Recognition
 from cmm_uq.jobs.importing.recording import read_recording_file
-from cmm_uq.jobs.job import NO_DATE, Job, JobFile, Tables, job_file_of
+from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.machines import in_coordinates, machine_of
 from cmm_uq.jobs.recording import compared
@@ -33,7 +33,7 @@ from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_dis
 from cmm_uq.jobs.tables import identification
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import ClausesForm, ConformityFacts, Standards, needed, uncertainty_missing
-from cmm_uq.jobs.tables.identification import REPLACED, altered, check_examples, check_mark, is_planned
+from cmm_uq.jobs.tables.identification import NO_DATE, REPLACED, altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.tables.machine import FurtherFacts, MachineFacts
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
 
-from cmm_uq.base.messages import NOTHING, Text, Verbatim
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.units import UNITS, printed_unit
 
 # verdicts of a diagnosis: nothing is found; noise and an error are not told apart; a cause, or part of it, is found; a
@@ -104,8 +104,7 @@ class Verdicts(tuple[Verdict, ...]):
                         one["by"] or "", Verbatim(one["title"] or ""), tuple(map(Verbatim, one["missing"])))
                 for one in there["statements"]
             )  # fmt: skip
-        return cls((*map(_by_standard, results.get("conformity") or ()), *_by_tolerance(results),
-                    *_of_part(results.get("characteristics") or ())))  # fmt: skip
+        return cls((*map(_by_standard, results.get("conformity") or ()), *_by_tolerance(results), *_of_part(results)))
 
 
 NO_VERDICTS = Verdicts()  # of what states no conformity
@@ -130,13 +129,19 @@ def _by_tolerance(results: Mapping[str, Any]) -> Iterator[Verdict]:
                               printed_unit(parameter))  # fmt: skip
 
 
-def _of_part(characteristics: Any) -> Iterator[Verdict]:
-    for one in characteristics:
-        if isinstance(one, Mapping) and one.get("decision"):
-            value, limits = one.get("value"), one.get("limits") or {}
-            ends = [end for end in (limits.get("lower"), limits.get("upper")) if end is not None]
-            # the limit that the value is nearest to, or farthest beyond
-            far = len(ends) == 2 and value is not None and value - ends[0] >= ends[1] - value
-            limit = ends[1] if far else next(iter(ends), None)
-            yield Verdict(str(one["name"]), str(one["decision"]["outcome"]), value, one.get("U"), limit,
-                          Verbatim(one.get("unit") or ""))  # fmt: skip
+def _of_part(results: Mapping[str, Any]) -> Iterator[Verdict]:
+    """Of each characteristic that was decided, and of each that was not measured beside them."""
+    decided = [one for one in results.get("characteristics") or () if isinstance(one, Mapping) and one.get("decision")]
+    if not decided:
+        return
+    withheld = tuple(map(Verbatim, results.get("decision", {}).get("withheld", ())))
+    for one in decided:
+        value, limits, outcome = one.get("value"), one.get("limits") or {}, str(one["decision"]["outcome"])
+        ends = [end for end in (limits.get("lower"), limits.get("upper")) if end is not None]
+        # the limit that the value is nearest to, or farthest beyond
+        far = len(ends) == 2 and value is not None and value - ends[0] >= ends[1] - value
+        limit = ends[1] if far else next(iter(ends), None)
+        yield Verdict(str(one["name"]), outcome, value, one.get("U"), limit, Verbatim(one.get("unit") or ""),
+                      missing=withheld if outcome == "undecided" else ())  # fmt: skip
+    for name in results.get("part", {}).get("not_measured", ()):
+        yield Verdict(str(name), "incomplete", None, None, None, NOTHING, missing=(say("it was not measured"),))

@@ -304,7 +304,9 @@ def test_references_of_which_no_uncertainty_is_stated_are_named() -> None:
     runs = AxisRuns(EXACT, joined(*six()))
     named = [str(text) for text, _ in runs.exact]
     assert not (runs.exact[0][1] & runs.exact[1][1]).any()
-    assert named == ["The reference of straightnesses", "The reference of rotations"]
+    assert named == [
+        f"The reference of {what} is given without an uncertainty" for what in ("straightnesses", "rotations")
+    ]
     stated = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0, u_straightness_um=0.0, u_rotation_arcsec=0.1)
     assert not AxisRuns(stated, joined(*six())).exact
     assert not AxisRuns(EXACT, joined(run(1, X))).exact

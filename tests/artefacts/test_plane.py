@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,14 +13,16 @@ import pytest
 
 import cmm_uq
 from cmm_uq.app.commands.jobs.check import check_job
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.plane import PlaneSurface
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.certificate.document import Facts
 from cmm_uq.maths.geometry import fit_plane
+from cmm_uq.maths.inference.posterior import gain
 from tests.artefacts.constructions import MIDDLE, estimated, free, indicated, recording
-from tests.artefacts.simulated import blocks, recovered, table
+from tests.artefacts.simulated import analysed, blocks, recovered, table
 from tests.conftest import ROOT
 from tests.recordings import with_columns
 
@@ -191,6 +194,23 @@ JOB = "plane-simulated"
 
 def test_the_errors_put_into_the_example_are_found() -> None:
     recovered(JOB, {"straightness_x_z": 4.0, "straightness_y_z": -2.5})
+
+
+def test_a_bow_of_an_axis_is_as_uncertain_as_the_surface_may_be_bowed(tmp_path: Path) -> None:
+    """A surface whose 2 µm of form are all a bow moves that of the axis by it; U of 0.36 µm had nothing of the form."""
+    text = (
+        (ROOT / "examples" / JOB / "job.toml").read_text(encoding="utf-8").replace("kind = ", "form_um = 2.0\nkind = ")
+    )
+    (tmp_path / "job.toml").write_text(text, encoding="utf-8")
+    shutil.copy(ROOT / "examples" / JOB / "recording.csv", tmp_path)
+    found, alone = analyse(tmp_path), analysed(JOB)
+    model, x = found.model, found.artefact.points.xyz[found.artefact.rows[:, 0], 0]
+    bow = np.zeros(x.shape)
+    bow[:] = 2e-3 * (2 * (x - x.mean()) / np.ptp(x)) ** 2
+    moved = gain(found.estimate.linear, float(found.posterior.sigma.mean()))[0] @ bow[model.used]
+    one, other = (each.parameters["straightness_x_z"]["bow_um"] for each in (found, alone))
+    assert abs(moved) > 4 * other.expanded
+    assert abs(moved) <= one.expanded <= 1.5 * abs(moved)
 
 
 def test_flatness_is_that_of_numpys_least_squares() -> None:

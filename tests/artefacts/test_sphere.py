@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from cmm_uq.app.commands.estimation import doubt_of
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.jobs.tables.conformity import Circumstances
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.maths.geometry import fit_sphere
-from tests.artefacts.constructions import estimated, free, hemisphere, indicated, spheres
+from tests.artefacts.constructions import estimated, free, hemisphere, indicated, model, spheres
 from tests.artefacts.simulated import analysed, recovered, table
 from tests.conftest import ROOT
 from tests.recordings import with_columns
@@ -88,6 +95,37 @@ def test_normals_of_rough_length_are_brought_to_unit_length() -> None:
     points = spheres()
     points = with_columns(points, **{c: np.round(points.columns[c], 4) for c in ("nx", "ny", "nz")})
     assert len(free(estimated(UNKNOWN_BALL, points, ["probe_radius"]))) == 1
+
+
+@pytest.mark.parametrize("lobes", [2, 3, 4, 6])
+def test_what_a_ball_that_is_not_round_does_to_lobes_is_in_their_uncertainty(lobes: int) -> None:
+    """All of a form of 0.4 µm in as many lobes: they swing by 0.2 µm, of unknown phase; their cosine has u = 0.2/√2 µm."""
+    ball = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.2, form_um=0.4)
+    effect = "probe_lobing" + f"_{lobes}" * (lobes != 3)
+    points = spheres()
+    seen = model(ball, points, ["probe_radius", effect])
+    (form,) = causes_of(seen.artefact, Circumstances())
+    u = np.sqrt(np.diag(doubt_of(seen, seen.estimate(), 1e-3, [form]).covariance()))
+    assert u[1:3] == pytest.approx(0.2 / np.sqrt(2), rel=0.2)
+    n = np.column_stack([points.columns[name] for name in ("nx", "ny", "nz")])
+    for phase in np.linspace(0, np.pi, 7):
+        round_off = 2e-4 * np.cos(lobes * np.arctan2(n[:, 1], n[:, 0]) + phase)
+        off = estimated(ball, points.at(points.xyz + round_off[:, None] * n), ["probe_radius", effect]).value
+        assert np.all(np.abs(off[:3]) <= 2 * u[:3] + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("form", "outcome"), [("form_um = 0.1", "pass"), ("form_um = 1.0", "undecided"), ("", "undecided")]
+)
+def test_lobes_of_the_probe_pass_by_no_ball_of_unknown_or_larger_form(form: str, outcome: str, tmp_path: Path) -> None:
+    """0.908 µm of lobes against 1.2 µm; U was 0.126 µm whatever the form."""
+    shutil.copytree(ROOT / "examples" / JOB, tmp_path / "job")
+    text = (tmp_path / "job" / "job.toml").read_text(encoding="utf-8").replace("form_um = 0.1", form)
+    text = text.replace("[test_un", "tolerances = { probe_lobing = 1.2 }\n\n[test_un").split("[[conformity]]")[0]
+    (tmp_path / "job" / "job.toml").write_text(text, encoding="utf-8")
+    (lobing,) = analyse(tmp_path / "job").verdicts
+    assert lobing.outcome == outcome
+    assert [str(text) for text in lobing.missing] == ([] if form else ["The form of the sphere is not stated"])
 
 
 @pytest.mark.long

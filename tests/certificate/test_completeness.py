@@ -113,13 +113,13 @@ DAY, BEFORE, AFTER = dt.date(2026, 3, 2), dt.date(2026, 3, 1), dt.date(2026, 3, 
 @pytest.mark.parametrize(("dates", "chain", "told"), [
     ({"issued": BEFORE}, {}, ["issued before it was measured, 2026-03-01 against 2026-03-02 ([job] issued)"]),
     ({"issued": DAY}, {}, []),
-    ({}, {"date": AFTER}, ["the artefact was certified after it was measured with, 2026-03-02 against 2026-03-03 "
+    ({}, {"date": AFTER}, ["artefact, the certificate is dated 2026-03-03, after the measurement of 2026-03-02 "
                            "([artefact.certificate] date)"]),
     ({}, {"date": DAY}, []),
-    ({}, {"due": BEFORE}, ["the artefact was due for calibration before this, 2026-03-01 against 2026-03-02 "
+    ({}, {"due": BEFORE}, ["artefact, the calibration was due on 2026-03-01, before the measurement of 2026-03-02 "
                            "([artefact.certificate] due)"]),
     ({}, {"due": DAY, "date": DAY}, []),
-    ({}, {"due": DAY, "date": AFTER}, ["after it was measured with", "was due before its date"]),
+    ({}, {"due": DAY, "date": AFTER}, ["after the measurement of", "was due before the certificate was issued"]),
     ({"recalibration_agreed": BEFORE}, {}, ["agreed for a day before this one"]),
 ])  # fmt: skip
 def test_dates_out_of_their_order_are_told(

@@ -8,7 +8,7 @@ too few for are those of a normal distribution where these are larger.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 import numpy as np
@@ -40,6 +40,11 @@ class LimitDecision:
     # none, or where a zone was measured so much better than its errors that even this value proves nothing
     accepted: Ends | None
     rule: Text
+
+    @property
+    def not_passing(self) -> LimitDecision:
+        """The same, undecided where it would be a pass, conditional or not."""
+        return replace(self, outcome="undecided") if self.outcome in ("pass", "conditional pass") else self
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,10 @@ from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.jobs import reading
 from cmm_uq.jobs.derived_job import against
-from cmm_uq.jobs.job import NO_DATE, Job
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import Nameable
 from cmm_uq.jobs.tables.conformity import Standards
+from cmm_uq.jobs.tables.identification import NO_DATE
 
 if TYPE_CHECKING:
     import pandas as pd

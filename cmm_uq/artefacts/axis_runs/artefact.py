@@ -43,7 +43,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
-from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.model.artefact import Artefact, Placings, Size, without_uncertainty
 from cmm_uq.machine.model.recorded import expansion, refuse
 from cmm_uq.machine.physics.effects.drives import index_change
 from cmm_uq.maths.geometry.positioning import CircularTest, PositioningRuns
@@ -217,7 +217,7 @@ class AxisRuns(Artefact):
             (TURNING, self._facts.u_rotation_arcsec, say("The reference of rotations")),
         ):
             if stated is None and any(run.kind == kind and not edge[run.rows].any() for run in self.runs):
-                yield title, self._kind == kind
+                yield without_uncertainty(title), self._kind == kind
 
     def _noise_scale(self) -> Floats:
         """As repeats show that the scatter of the kinds compares; else as readings are off their neighbours.

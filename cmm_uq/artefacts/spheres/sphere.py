@@ -32,11 +32,15 @@ from cmm_uq.machine.model.artefact_doubt import form_faults
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import expansion, place
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.effects.own_states import HARMONICS, harmonics, turned_back
 from cmm_uq.maths.geometry import fit_sphere
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # between a recorded normal and the direction away from the centre; beyond it the normals belong to something else
 LARGEST_ANGLE = np.radians(20.0)
+
+
+_OF_FORM = (*HARMONICS, *((6, order) for order in range(-6, 7)))  # probes have two to six lobes
 
 
 class SphereArtefact(Radial):
@@ -59,6 +63,12 @@ class SphereArtefact(Radial):
         self.form = (facts.form_um or 0.0) * MICROMETRE
         if all(f"n{a}" in points.columns for a in AXES):
             self._take_normals(where)
+
+        if not self.form:
+            self.exact = ((say("The form of the sphere is not stated"), np.ones(len(points), dtype=bool)),)
+
+    def form_patterns(self) -> Floats:
+        return harmonics(self.directions(self.points.xyz), turned_back(self.points), _OF_FORM)
 
     def own_faults(self) -> Iterable[Effect]:
         return form_faults(self._facts, self._facts.form_um, self.points)

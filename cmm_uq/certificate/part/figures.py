@@ -211,7 +211,7 @@ def _verdicts(found: PartMeasurement, every: Sequence[CharacteristicFigures]) ->
             chance = say("conforms with {p}", p=probability(judged.probability or 0.0))
             standing = standing_of(judged.outcome)
             told.append(Headline(judged.outcome.upper(), standing, _named(one), (chance, judged.rule)))
-    if found.together is not None and len(told) > 1:
+    if found.together is not None and (len(told) > 1 or found.job.facts.part.not_measured):
         whole = found.outcome or "undecided"
         chance = say("all conform with {p}", p=probability(found.together))
         told.insert(0, Headline(whole.upper(), standing_of(whole), say("the part"), (chance,)))

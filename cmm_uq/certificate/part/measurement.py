@@ -143,6 +143,7 @@ class PartMeasurement:
     warnings: tuple[Text, ...] = ()  # what the reader must know before using a figure
     files: Mapping[str, bytes] = field(default_factory=dict)  # that come with the page, by name
     influence: tuple[PriorInfluence, ...] = ()  # what other priors of the machine's errors would change
+    withheld: tuple[Text, ...] = ()  # why nothing is called conforming, whatever its value
 
     @property
     def characteristics(self) -> list[CharacteristicFacts]:
@@ -179,8 +180,9 @@ class PartMeasurement:
 
     @property
     def outcome(self) -> str | None:
-        """Of the part: the gravest of its characteristics; ``None`` where nothing is decided."""
-        return gravest(self.outcomes) if self.outcomes else None
+        """Of the part: the gravest of its characteristics, incomplete without some; ``None`` where nothing is decided."""
+        left = ["incomplete"] if self.job.facts.part.not_measured else []
+        return gravest([*self.outcomes, *left]) if self.outcomes else None
 
     @property
     def judged_by(self) -> Text:
@@ -203,6 +205,14 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
     said = {one.of: one for one in found.given.machine.statements}
     read_by = readings_data(found.given.machine.machine, found.given.machine.statements)
     factors = np.array([_in(one, 1.0) for one in found.characteristics])
+    part = {"name": facts.part.name, "drawing": facts.part.drawing or None, "serial": facts.part.serial or None,
+            "not_measured": list(facts.part.not_measured)}  # fmt: skip
+    decision = {
+        "rule": rule_name(facts.decision.rule), "words": _plain(found.judged_by),
+        "prior": None if facts.decision.prior is None else facts.decision.prior.model_dump(),
+        "outcome": found.outcome, "probability_all_conform": found.together,
+        **({"withheld": list(map(_plain, found.withheld))} if found.withheld else {}),
+    }  # fmt: skip
     return {
         "schema": SCHEMA,
         "software": {"name": NAME, "version": __version__},
@@ -210,8 +220,7 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
             "id": job.id, **({"number": job.number} if job.number else {}), "origin": job.origin, "date": job.date.isoformat(),
             **({"language": job.language} if job.language != ENGLISH else {}), "inputs_sha256": sha256(found.job.inputs),
         },
-        "part": {"name": facts.part.name, "drawing": facts.part.drawing or None, "serial": facts.part.serial or None,
-                 "not_measured": list(facts.part.not_measured)},
+        "part": part,
         "machine": standing_data(found.standing) | {
             "families": families_data(found.given.machine.scales),
             "bounds": [
@@ -231,12 +240,8 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         "correlation": {"characteristics": names, "matrix": found.correlation.tolist()},
         "covariance": {"characteristics": names, "units": [unit_of(one) for one in found.characteristics],
                        "matrix": (simulated.covariance * factors * factors[:, None]).tolist()},
-        "decision": {
-            "rule": rule_name(facts.decision.rule), "words": _plain(found.judged_by),
-            "prior": None if facts.decision.prior is None else facts.decision.prior.model_dump(),
-            "outcome": found.outcome, "probability_all_conform": found.together,
-        },
-        "verdicts": Verdicts.of_results({"characteristics": stated}).data(),
+        "decision": decision,
+        "verdicts": Verdicts.of_results({"characteristics": stated, "part": part, "decision": decision}).data(),
         "budget": {
             "characteristics": list(shares.characteristics),
             "causes": rows(cause=shares.causes, first=shares.first.tolist(), total=shares.total.tolist()),

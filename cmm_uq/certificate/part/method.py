@@ -150,20 +150,20 @@ def _unstated(found: PartMeasurement) -> list[Text]:
 
 
 def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
-    """What a reader must know of decisions on an uncertainty that lacks styli, temperatures, expansion or form."""
+    """That nothing is called conforming by an uncertainty that lacks styli, temperatures, expansion or form."""
     facts, room = found.job.facts, found.job.facts.environment
     touching = any(one.diameter_mm and not (one.u_diameter_um or one.lobing_um) for one in facts.stylus)
     cold = room.part_c == REFERENCE_TEMPERATURE
     without = holding(
         (touching, say("qualification of the styli")),
-        (not room.u_part_k, say("temperatures")),
+        (not room.u_part_k or (room.scales_cte_per_k and not room.u_scales_k), say("temperatures")),
         (not (facts.part.cte_per_k and (facts.part.u_cte_per_k or cold)), say("expansion of the part")),
         (not found.given.forms, say("form and roughness of the part")),
     )
     if found.measured is None or not without or not any(found.judged):
         return ()
     what = messages.listed(without)
-    return (say("Decided as if these had no uncertainty, of which the job states none: {what}.", what=what),)
+    return (say("Nothing is called conforming, for the job states no uncertainty of these: {what}.", what=what),)
 
 
 _NOTHING = 5e-4  # share of a variance that is printed as none

@@ -25,7 +25,7 @@ from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_
 from cmm_uq.certificate.part.plots import Margin, correlation_section, margin_plots
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
 from cmm_uq.jobs.tables.identification import MEASURED
-from cmm_uq.jobs.verdicts import gravest, standing_of
+from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import nominal
 
 
@@ -42,18 +42,19 @@ def overview_of(found: PartMeasurement) -> doc.Overview:
         (say("Not covered"), _not_covered(found)),
     )
     return doc.Overview(
-        verdict_words(found.outcomes, measured=found.measured is not None),
+        verdict_words(found.outcomes, found.outcome, measured=found.measured is not None, withheld=found.withheld),
         "unknown" if found.outcome is None else standing_of(found.outcome),
         facts.rows,
     )
 
 
-def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
+def verdict_words(
+    outcomes: Sequence[Outcome], outcome: str | None, *, measured: bool, withheld: Sequence[Text] = ()
+) -> Text:
     """Whether the part conforms.
 
-    ``measured``: whether anything was.
+    ``outcomes``: of its characteristics; ``outcome``: of the whole. ``measured``: whether anything was.
     """
-    outcome = gravest(outcomes)
     if not outcomes:
         planned = say("Uncertainty of a planned measurement: nothing was measured")
         return say("Measured: no limits to decide on") if measured else planned
@@ -70,6 +71,10 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
         return say("Does not conform: {told} within the limits", told=told)
     if outcome == "conditional pass":
         return say("Conditionally accepted: all values are within their limits, not all with their uncertainty")
+    if outcome == "incomplete":
+        return say("Incomplete: not all of the drawing was measured")
+    if withheld:
+        return withheld[0]
     open_ = sum(one == "undecided" for one in outcomes)
     return plural(
         open_,

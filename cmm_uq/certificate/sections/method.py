@@ -10,6 +10,7 @@ from cmm_uq.certificate.plots.corner import corner_plot
 from cmm_uq.certificate.result import RecordingNoise, Result
 from cmm_uq.certificate.sections.regions import regions_warnings
 from cmm_uq.certificate.wording import stated_physics, title_of, with_uncertainty
+from cmm_uq.machine.model.artefact import without_uncertainty
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT, IMPLAUSIBLE
 from cmm_uq.maths.inference.ensembles import Chains
@@ -203,9 +204,9 @@ def _noise(result: Result) -> list[Text]:
         "Only {degrees_of_freedom} degrees of freedom are left to estimate the noise from.", degrees_of_freedom=freedom
     )
     texts += holding((freedom < 3 and noise.stated_um is None, few))
-    exact = [one.title for one in result.artefact.sizes if one.certified and one.sd == 0]
-    exact += [title for title, _ in result.artefact.exact]
-    return texts + [say("{title} is given without an uncertainty and is taken as exact.", title=each) for each in exact]
+    exact = [without_uncertainty(one.title) for one in result.artefact.sizes if one.certified and one.sd == 0]
+    exact += [reason for reason, _ in result.artefact.exact]
+    return texts + [say("{reason} and is taken as exact.", reason=each) for each in exact]
 
 
 def _expansion(result: Result) -> list[Text]:

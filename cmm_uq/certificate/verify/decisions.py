@@ -233,12 +233,13 @@ def check_part_decisions(inquiry: Inquiry, data: Mapping[str, Any], file: str) -
         problems = list(_accepted(each, rule))
         if decision is not None:
             decisions.append(decision)
-            problems += _decision(each, rule, known=prior is not None)
+            problems += _decision(each, rule, known=prior is not None, withheld=bool(whole.get("withheld")))
         elif each["value"] is not None:
             problems.append(("decision", "is missing, though there are a value and limits", None, ""))
         for key, problem, stands, should in problems:
             wrong(f"characteristics[{i}].{key}", problem, stands, should)
-    gravest_of_all = gravest([decision["outcome"] for decision in decisions]) if decisions else None
+    left = ["incomplete"] if data["part"]["not_measured"] else []
+    gravest_of_all = gravest([*(decision["outcome"] for decision in decisions), *left]) if decisions else None
     inquiry.compare("decisions", file, "decision.outcome", "is not the worst of the characteristics", whole["outcome"],
                     gravest_of_all)  # fmt: skip
     joint = whole["probability_all_conform"]
@@ -292,7 +293,7 @@ def _between(stated: Sequence[float | None] | None, narrow: Ends | None, wide: E
     return True
 
 
-def _decision(each: Mapping[str, Any], rule: Rule, *, known: bool) -> Iterator[Wrong]:
+def _decision(each: Mapping[str, Any], rule: Rule, *, known: bool, withheld: bool) -> Iterator[Wrong]:
     decision, value, limits, u = each["decision"], each["value"], each["limits"], each["u"]
     inside, beyond = decision["probability_conforming"], decision["probability_beyond"]
     if not (0.0 <= inside <= 1.0 and 0.0 <= beyond <= 1.0) or abs(inside + beyond - 1.0) > 1e-3:
@@ -300,6 +301,8 @@ def _decision(each: Mapping[str, Any], rule: Rule, *, known: bool) -> Iterator[W
     accepted = limits["accepted"]
     ends = None if accepted is None else (accepted[0], accepted[1])
     possible = {outcome_of(_limits(each, u * (1 + side * DRAWN)), rule, value, ends) for side in (-1, 0, 1)}
+    if withheld:
+        possible = {"undecided" if one in ("pass", "conditional pass") else one for one in possible}
     edges = [end for end in (limits["lower"], limits["upper"], *(accepted or ())) if end is not None]
     tenth_digit_decides = any(isclose(value, end, rel_tol=1e-9, abs_tol=1e-12) for end in edges)
     if decision["outcome"] not in possible and not tenth_digit_decides:

@@ -20,7 +20,7 @@ from cmm_uq.base.files.limits import PDF_BYTES, content_of
 from cmm_uq.certificate.sign.found import AFTER
 from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, Inquiry, given_of, strict_json
 from cmm_uq.certificate.verify.views import AHEAD, Signed
-from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
+from cmm_uq.jobs.chain import dates_out_of_order
 from cmm_uq.jobs.dcc import read
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.facts import ChainHead, Witness, instant
@@ -198,7 +198,7 @@ def check_dates(inquiry: Inquiry, job: Job) -> None:
     for text in dates_out_of_order(job):
         inquiry.wrong("dates", JOB, "", str.__str__(text))
     chain = job.facts.artefact.certificate
-    if certified_on_this_machine(job.facts):
+    if job.facts.certified_on_this_machine:
         inquiry.notes.append("The artefact was certified on the machine that it tests; the certificate says so.")
     if chain is not None and chain.number and chain.until is None:
         note = "The artefact's certificate has no date by which it is due: that it was in date is not shown."

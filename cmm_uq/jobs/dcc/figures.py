@@ -14,6 +14,7 @@ from typing import Any
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.dcc.certificate import DccQuantity, Element, Measurement, QuantityList, StatementMetadata
+from cmm_uq.jobs.tables.length_formula import divisor_of
 from cmm_uq.maths.uncertainty.quantity import rounded
 
 Covariance = tuple[tuple[tuple[Decimal, ...], ...], str]  # of the values, row by row, and its unit
@@ -36,6 +37,14 @@ class ValueUncertainty:
         if self.standard is not None or self.expanded is None or not self.factor:
             return self.standard
         return self.expanded / self.factor
+
+    @property
+    def normal_u(self) -> Decimal | None:
+        """The same, of the normal distribution with the interval of U and p where k is more than that of one."""
+        if self.standard is not None or self.expanded is None or self.factor is None or self.factor <= 2:
+            return self.u
+        level = None if self.probability is None else float(self.probability)
+        return self.expanded / Decimal(divisor_of(float(self.factor), None, level) or 1)
 
     @property
     def printed(self) -> tuple[str, str, str, str]:

@@ -186,7 +186,7 @@ def _valued(value: CertifiedValue, quantity: QuantityFigures, given: Mapping[str
             raise _contradicted(f"[artefact] {value.key}", stated[key], table[key], where)
         table = {}
     if value.u_key:
-        us = [each.u for each in quantity.uncertainties]  # none where one value has none
+        us = [each.normal_u for each in quantity.uncertainties]  # none where one value has none
         largest = [u * _METRES[unit] for u, unit in zip(us, quantity.units, strict=True) if u is not None]
         u_um = float(max(largest) * 1_000_000) if len(largest) == len(us) else None
         longest = max(numbers) if not value.micrometres else 0.0
@@ -252,7 +252,7 @@ def _places(point: Floats | None, wanted: Sequence[str], held: Sequence[Quantity
     if point is None or any(len(one.values) != len(point) for one in held):
         return None
     scales = [np.array([float(_METRES[unit]) * 1e6 for unit in one.units]) for one in held]
-    stated = [np.array([float(each.u or 0) for each in one.uncertainties]) for one in held]
+    stated = [np.array([float(each.normal_u or 0) for each in one.uncertainties]) for one in held]
     names = (name.replace("reference_", "reference_u_").replace("mm", "um") for name in wanted)
     u = {name: scale * own for name, scale, own in zip(names, scales, stated, strict=True)}
     matrices = [one.covariance[0] for one in held if one.covariance is not None]
@@ -281,7 +281,7 @@ def _farthest(columns: Sequence[QuantityFigures]) -> tuple[float, float]:
 def _variance_of_difference(one: QuantityFigures, last: int) -> float:
     """Of the last value minus the first, µm²."""
     scale = [float(_METRES[unit]) * 1e6 for unit in one.units]
-    first, other = (float(one.uncertainties[i].u or 0) * scale[i] for i in (0, last))
+    first, other = (float(one.uncertainties[i].normal_u or 0) * scale[i] for i in (0, last))
     common = 0.0
     if one.covariance is not None and len(one.covariance[0]) > last:
         common = float(one.covariance[0][0][last]) * scale[0] * scale[last]

@@ -82,7 +82,7 @@ def with_references(
         k = float(stated[1].replace(",", "."))
         if artefact.k not in (None, k) or not 1 <= k <= 10:
             raise CmmUqError(f"says k = {k:g} in a heading", where=place, fix="Mend it, or [artefact] k")
-        columns[STANDARD] = columns.pop(EXPANDED) / k
+        columns[STANDARD] = columns.pop(EXPANDED) / (k if artefact.degrees_of_freedom else divisor_of(k, None) or k)
     for name, values in columns.items():
         if np.any(np.abs(values) > largest(name)):
             raise CmmUqError(f"{name} is more than anything that is measured", where=place, fix="Check its unit")

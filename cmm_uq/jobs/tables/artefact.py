@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import datetime as dt
 from calendar import monthrange
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -15,9 +15,11 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from cmm_uq.base.files.table import Column, Expansion, JobTable, Length, key, required
-from cmm_uq.base.messages import Text, day, say
+from cmm_uq.base.messages import Text, commas, day, names, say
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.jobs.columns import in_words
 from cmm_uq.jobs.importing.format import FileKeys
+from cmm_uq.jobs.tables.identification import NO_DATE
 from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
 
 
@@ -101,18 +103,20 @@ class Traceability(JobTable):
         year = min(self.date.year + years, dt.MAXYEAR)
         return dt.date(year, month + 1, min(self.date.day, monthrange(year, month + 1)[1]))
 
-    def denials(self, measured: dt.date) -> Iterator[tuple[Text, str]]:
-        """What of its dates says that the calibration did not hold on the day of a measurement, and by which key."""
+    def denials(self, measured: dt.date, table: str) -> Iterator[tuple[Text, str]]:
+        """What of its dates denies that the calibration held on the day of a measurement, and which key says so."""
         date, until, on = self.date, self.until, day(measured)
-        if date is not None and date > measured:
-            yield say("the certificate is dated {date}, after the measurement of {day}", date=day(date), day=on), "date"
-        if until is not None and until < measured:
-            yield (
-                say("the calibration was due on {due}, before the measurement of {day}", due=day(until), day=on),
-                "due",
-            )
+        if measured == NO_DATE:
+            if date is not None or until is not None:
+                yield say("the day of the measurement is not stated"), "[job] date"
+        elif date is not None and date > measured:
+            after = say("the certificate is dated {date}, after the measurement of {day}", date=day(date), day=on)
+            yield after, f"{table} date"
+        if until is not None and NO_DATE != measured > until:
+            due = say("the calibration was due on {due}, before the measurement of {day}", due=day(until), day=on)
+            yield due, f"{table} due"
         elif date is not None and until is not None and until < date:
-            yield say("the calibration was due before the certificate was issued"), "due"
+            yield say("the calibration was due before the certificate was issued"), f"{table} due"
 
 
 class ThermometerFacts(JobTable):
@@ -123,6 +127,16 @@ class ThermometerFacts(JobTable):
     name: str = key("", "Name of the thermometer on the certificate.")
     serial: str = key("", "Serial number of the thermometer.")
     certificate: Traceability = key(Traceability(), "The thermometer's own certificate.")
+
+    def called(self, columns: Iterable[str]) -> Text:
+        """By its name and serial number, or by the columns of a recording that it gave."""
+        if named := commas(names(filter(None, (self.name, self.serial)))):
+            return say("thermometer {named}", named=named)
+        return nameless(columns)
+
+
+def nameless(columns: Iterable[str]) -> Text:
+    return say("thermometer of the {column}", column=commas(map(in_words, columns)))
 
 
 class CertificateFile(FileKeys, Traceability):
@@ -158,7 +172,9 @@ class ArtefactFacts(JobTable):
     U_um: LengthUncertainty | None = None
     """Expanded uncertainty as the artefact's certificate states it, in place of `u_um`: a number, or a formula of the length
     as `"0.2 + 0.5·L/1000"` or `"Q[0.2; 0.5·L/1000]"`, L in mm; needs `k` or `degrees_of_freedom`."""
-    k: Factor | None = key(None, "Coverage factor of `U_um`, or of a column `reference_U_um`.")
+    k: Factor | None = None
+    """Coverage factor of `U_um`, or of a column `reference_U_um`. Above 2 and without `degrees_of_freedom` it is taken as
+    Student's t for 95 %, but 2.58 and 3, which are of a normal distribution."""
     degrees_of_freedom: Freedom | None = None
     """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them. Figures and
     decisions take u of the normal distribution with the same 95 % interval."""

@@ -20,6 +20,8 @@ from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import MANIFEST, read_manifest
 from cmm_uq.jobs.source import device_name, sha256
 
+NO_DATE = dt.date(1970, 1, 1)  # of a job that says none: the clock is never read
+
 Origin = Literal["measured", "simulated", "compensated"]
 MEASURED: Final = "measured"
 SIMULATED: Final = "simulated"

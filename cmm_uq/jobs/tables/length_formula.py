@@ -80,6 +80,9 @@ HOW_U = (
 _LEVEL = 0.95
 """Probability of the interval that a certificate with degrees of freedom and without k states (JCGM 100:2008, table G.2)."""
 
+_NORMAL = (2.576, 2.58, 3.0)
+"""Coverage factors of a normal distribution for 99 % and 99.73 % (JCGM 100:2008, table G.1), as certificates print them."""
+
 _MINUS = str.maketrans(
     {"⁻": "-", "−": "-", "–": "-", **{raised: str(digit) for digit, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}}
 )
@@ -168,18 +171,29 @@ def factor_of(k: float | None, degrees_of_freedom: float | None) -> float | None
     return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * _LEVEL))
 
 
-def divisor_of(k: float | None, degrees_of_freedom: float | None) -> float | None:
+def students(k: float) -> bool:
+    """Whether a coverage factor beside which nothing is stated is one of Student's t, and of no normal distribution."""
+    return k > 2 and k not in _NORMAL
+
+
+def divisor_of(k: float | None, degrees_of_freedom: float | None, level: float | None = None) -> float | None:
     """What an expanded uncertainty is divided by; ``None`` where neither is stated.
 
     Estimates and decisions take what is certified as normal. With few degrees of freedom it is Student's t, so that U/k would
-    have a smaller 95 % interval than the certificate: u is that of the normal distribution with the same one.
+    have a smaller 95 % interval than the certificate: u is that of the normal distribution with the same one. A factor above
+    2 without degrees of freedom, and of no normal distribution, is t for 95 % of a few that nobody states (JCGM 100:2008,
+    G.3.2), of an interval with another ``level`` for that.
     """
     factor = factor_of(k, degrees_of_freedom)
-    if factor is None or degrees_of_freedom is None:
+    if factor is None or (factor <= 2 and degrees_of_freedom is None):
         return factor
     from scipy.special import ndtri
 
-    return factor * float(ndtri(0.5 + 0.5 * _LEVEL)) / (factor_of(None, degrees_of_freedom) or 1.0)
+    if degrees_of_freedom is not None:
+        return factor * float(ndtri(0.5 + 0.5 * _LEVEL)) / (factor_of(None, degrees_of_freedom) or 1.0)
+    if level is None and not students(factor):
+        return factor
+    return min(factor, float(ndtri(0.5 + 0.5 * (level or _LEVEL))))
 
 
 def with_standard_uncertainty(data: Any, *, columns: bool = False) -> Any:

@@ -88,6 +88,10 @@ def ranges_of_repeats(values: Floats, rows: Ints, lengths: Floats, of: Ints) -> 
     return ArtefactFigure(ranges, rows[padded].reshape(len(ranges), -1), lengths[padded[:, 0]])
 
 
+def without_uncertainty(title: Text) -> Text:
+    return say("{title} is given without an uncertainty", title=title)
+
+
 Role = Literal["dimension", "sought", "set-up"]
 
 
@@ -129,7 +133,7 @@ class Artefact(ABC):
     form: float = 0.0  # deviation of its own form by its certificate, mm; 0 where it is not stated
     # Sxy, Syz, Szx, rad, of axes on which its observations were found: where estimates begin
     leans: Floats = np.zeros(3)
-    # what readings go by, beside its sizes, of which nobody states an uncertainty; with which observations (m,) do
+    # of what readings go by beside its sizes nobody states an uncertainty, in a clause; with which observations (m,) do
     exact: tuple[tuple[Text, NDArray[np.bool_]], ...] = ()
     key_of_u: ClassVar[str] = "u_um"  # of ``[artefact]``, that says how uncertain its lengths are
 
@@ -232,6 +236,10 @@ class Artefact(ABC):
     def calibration(self) -> Cause | None:
         """What its certificate leaves open of several lengths beyond its sizes; ``None`` of an artefact of one length."""
         return None
+
+    def form_patterns(self) -> Floats:
+        """Patterns (m, r) that a deviation of its form may have; none of what has no form of its own."""
+        return np.zeros((len(self.rows), 0))
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
         """A point on the line of each length between two points, and the line's direction, (m, 3) each."""

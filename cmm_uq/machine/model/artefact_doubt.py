@@ -19,6 +19,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from cmm_uq.base.messages import Text, say
@@ -26,7 +27,7 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, PPM, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import Circumstances
-from cmm_uq.machine.model.artefact import Artefact, Size
+from cmm_uq.machine.model.artefact import Artefact, Size, without_uncertainty
 from cmm_uq.machine.model.recorded import stated_sd
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_errors import GEOMETRY, PATTERN, Body, FaultyArtefact, OwnFault, deformations
@@ -171,15 +172,21 @@ class CertifiedPlaces:
 
 
 def causes_of(artefact: Artefact, circumstances: Circumstances) -> tuple[Cause, ...]:
-    """Causes that the observations (m,) of an artefact err by; none where nothing is stated, or it has no dimension.
+    """Causes that the observations (m,) of an artefact err by; none where nothing is stated, or none has to do with it.
 
     The coefficient of expansion is one; whether the others err alike in all set-ups is not known. Of the calibration a size of
-    the artefact has what all its lengths have in common; here is what is more where each has an error of its own.
+    the artefact has what all its lengths have in common; here is what is more where each has an error of its own. Of a form
+    only the deviation is certified, a range F: any pattern of some waves may be all of it. A wave of that range swings by F/2,
+    its cosine and its sine by an unknown phase, each with a mean square of F²/8 (arc sine, JCGM 101:2008, 6.4.6.4): F/4 of a
+    pattern of mean square one over the points. What all patterns together do to an estimate is what its own would do.
     """
-    stated, along = circumstances.uncertainty, growth(artefact)
+    stated, along, set_up = circumstances.uncertainty, growth(artefact), artefact.measurement
+    form = np.hypot(artefact.form, stated.u_form_um * MICROMETRE)
+    shapes = form / 4 * np.sqrt(len(set_up)) * scipy.linalg.orth(artefact.form_patterns()) if form else np.zeros(0)
+    forms = (Cause.of_blocks(say("form of the artefact"), shapes, set_up),) if shapes.size else ()
     if along is None:
-        return ()
-    set_up, excess = artefact.measurement, np.zeros(len(along))
+        return forms
+    excess = np.zeros(len(along))
     if (recorded := artefact.points.columns.get("temp_artefact_c")) is not None:
         excess = recorded[artefact.rows].mean(axis=1) - REFERENCE_TEMPERATURE
     of_length = stated.u_alignment_um or stated.u_fixturing_um
@@ -192,7 +199,7 @@ def causes_of(artefact: Artefact, circumstances: Circumstances) -> tuple[Cause, 
     expansion = Cause(say("expansion coefficient of the artefact"), (stated.u_cte_per_k * excess * along)[:, None])
     calibration = artefact.calibration()
     every = (expansion, *(Cause.of_blocks(name, change, set_up) for name, change in changes))
-    stated_causes = tuple(cause for cause in every if np.any(cause.common))
+    stated_causes = (*(cause for cause in every if np.any(cause.common)), *forms)
     return stated_causes if calibration is None else (calibration, *stated_causes)
 
 
@@ -212,14 +219,17 @@ def taken_as_exact(artefact: Artefact, used: NDArray[np.bool_], weights: Floats,
     u : its standard uncertainty. It rests on a size of which a ppm moves it by a thousandth of u, on certified places where
     it is of several, and on readings that have a thousandth of the square of its weights.
     """
-    found = [title for title, own in artefact.exact if np.sum(weights[own[used]] ** 2) > _NOTICED * (weights @ weights)]
+    found = [
+        reason for reason, own in artefact.exact if np.sum(weights[own[used]] ** 2) > _NOTICED * (weights @ weights)
+    ]
     exact = [i for i, size in enumerate(artefact.sizes) if size.role == "dimension" and size.sd == 0]
     if exact:
         nominal = [artefact.sizes[i].nominal for i in exact]
         moved = np.abs(weights @ artefact.size_change()[used][:, exact]) * nominal * PPM
         places = isinstance(getattr(artefact, "certificate", None), CertifiedPlaces)
-        found += [artefact.sizes[i].title for i, by in zip(exact, moved, strict=True) if places or by > _NOTICED * u]
-    return [say("{title} is given without an uncertainty", title=title) for title in found]
+        own = [i for i, by in zip(exact, moved, strict=True) if places or by > _NOTICED * u]
+        found += [without_uncertainty(artefact.sizes[i].title) for i in own]
+    return found
 
 
 def longest_lengths(artefact: Artefact) -> Floats:

@@ -224,9 +224,9 @@ class Cause:
 
     @classmethod
     def of_blocks(cls, name: Text, changes: Floats, block: Ints) -> Cause:
-        """One that changes observations by ``changes`` (m,) mm, all together or those of one ``block`` (m,) by themselves."""
+        """One that changes observations by ``changes`` (m,) or (m, r) mm, all as one or those of one ``block`` (m,) apart."""
         _, index = np.unique(block, return_inverse=True)
-        columns = changes[:, None]
+        columns = changes.reshape(len(changes), -1)
         return cls(name, columns, Freedoms(columns, index.ravel(), int(index.max(initial=-1)) + 1))
 
     def at(self, rows: NDArray[np.bool_]) -> Cause:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import cmm_uq
@@ -18,6 +20,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
+from cmm_uq.certificate.clauses import formal_warnings
 from cmm_uq.jobs.tables.conformity import (
     Circumstances,
     ConformityFacts,
@@ -188,7 +191,7 @@ def job(folder: Path, change: dict[str, str] | None = None, more: str = "") -> P
 
 
 def test_an_expanded_uncertainty_stands_for_a_standard_one(tmp_path: Path) -> None:
-    found = read_job(job(tmp_path, {"u_um = 0.4": "U_um = 0.9\nk = 2.25"}))
+    found = read_job(job(tmp_path, {"u_um = 0.4": "U_um = 0.8\nk = 2.0"}))
     assert found.facts.artefact.u_um == pytest.approx(0.4)
 
 
@@ -280,7 +283,7 @@ def test_a_certificate_of_lengths_holds_on_the_day_unless_its_dates_deny_it(
     shutil.copytree(iota, tmp_path / "job")
     (tmp_path / "job" / "job.toml").write_text(text, encoding="utf-8")
     found = read_job(tmp_path / "job").circumstances.lapsed
-    keys = {at for _, at in found}
+    keys = {at for _, at in found} - {"[artefact.certificate] machine"}  # of the iota's own machine, by the example
     assert keys == (set() if key is None else {f"[artefact.certificate] {key}"}), found
 
 
@@ -306,7 +309,7 @@ def test_a_tolerance_on_what_rests_on_a_size_without_uncertainty_is_no_pass(
     example: str, u: str, tolerances: dict[str, float], undecided: set[str], tmp_path: Path
 ) -> None:
     shutil.copytree(ROOT / "examples" / example, tmp_path / "job")
-    text = (tmp_path / "job" / "job.toml").read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^machine = .*$", "", (tmp_path / "job" / "job.toml").read_text(encoding="utf-8"))
     for stated in ("", rf"(?m)^{u} = .*\n"):
         text = re.sub(stated, "", text) if stated else text
         asked = ", ".join(f"{name} = {limit}" for name, limit in tolerances.items())
@@ -320,3 +323,38 @@ def test_a_tolerance_on_what_rests_on_a_size_without_uncertainty_is_no_pass(
         assert withheld == (undecided if stated else set())
         assert all(found[name].outcome == "undecided" for name in withheld)
         assert len(found) == len(tolerances)
+
+
+@pytest.mark.parametrize(("changed", "lack"), [
+    ("[[thermometer]]\ncolumns = ['temp_x_c']\ncertificate = { due = 2004-08-31 }", "the calibration was due on 2004-08-31"),
+    ("[[thermometer]]\ncolumns = ['temp_x_c']\ncertificate = { due = 2004-09-01 }", None),
+    ("[[thermometer]]\ncolumns = ['temp_artefact_c']\ncertificate = { due = 2004-08-31 }", None),  # which is not recorded
+    ("[artefact.certificate]\nmachine = 'DEA Iota 1102'", "artefact: a certificate from another machine"),
+])  # fmt: skip
+def test_thermometers_out_of_calibration_and_the_machine_as_its_own_reference_make_no_pass(
+    changed: str, lack: str | None, iota: Path, tmp_path: Path
+) -> None:
+    """Measured on 2004-09-01: 79 ± 40 ppm pass 150 ppm."""
+    shutil.copytree(iota, tmp_path / "job")
+    text = re.sub(r"(?m)^machine = .*$", "", (tmp_path / "job" / "job.toml").read_text(encoding="utf-8"))
+    head, _, rest = changed.partition("\n")
+    text = text.replace(head, f"{head}\n{rest}") if head in text else f"{text}\n{changed}\n"
+    text = re.sub(r"(?m)^effects = .*$", r"\g<0>\ntolerances = { scale_x = 150.0 }", text)
+    (tmp_path / "job" / "job.toml").write_text(text, encoding="utf-8")
+    rows = (tmp_path / "job" / "ballbar.csv").read_text(encoding="utf-8").splitlines()
+    rows = [rows[0] + ",temp_x_c", *(f"{row},20.0" for row in rows[1:])]
+    (tmp_path / "job" / "ballbar.csv").write_text("\n".join(rows), encoding="utf-8")
+    found = cmm_uq.report(tmp_path / "job").outcome.verdicts[-1]
+    assert found.outcome == ("pass" if lack is None else "undecided")
+    assert [lack in str(text) for text in found.missing] == ([] if lack is None else [True])
+    out_of_order = [str(text) for text in formal_warnings(read_job(tmp_path / "job")) if "Dates out" in text]
+    assert len(out_of_order) == (lack is not None and "calibration" in lack)
+
+
+def test_a_job_without_a_date_beside_dated_certificates_says_that_the_day_is_missing() -> None:
+    frame = pd.read_csv(ROOT / "examples" / "iota-1102-20C" / "ballbar.csv")
+    artefact = {"kind": "ballbar", "length_mm": 404.2357, "u_um": 1.5, "certificate": {"date": dt.date(2003, 9, 1)}}
+    job = cmm_uq.job(frame, machine="DEA Iota 1102", artefact=artefact, effects=["scale_x"])
+    (lapsed,) = job.circumstances.lapsed
+    assert lapsed == ("traceability (artefact: the day of the measurement is not stated)", "[job] date")
+    assert not [text for text in formal_warnings(job) if "1970" in text]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from functools import cache
@@ -215,13 +215,27 @@ def test_limits_on_one_side_and_on_none(every_kind: PartMeasurement) -> None:
     assert lengths.rows[0][5].startswith("up to 2")
 
 
-def judged_as(found: PartMeasurement, outcomes: Iterable[Outcome | None]) -> Overview:
-    """The overview, had the rule decided otherwise."""
+def judged_as(found: PartMeasurement, outcomes: Iterable[Outcome | None], left: Sequence[str] = ()) -> Overview:
+    """The overview, had the rule decided otherwise, and with these characteristics of the drawing not measured."""
     judged = tuple(
         None if outcome is None or one is None else replace(one, outcome=outcome)
         for one, outcome in zip(found.judged, outcomes, strict=True)
     )
-    return overview_of(replace(found, judged=judged))
+    facts = found.job.facts
+    facts = facts.model_copy(update={"part": facts.part.model_copy(update={"not_measured": list(left)})})
+    return overview_of(replace(found, judged=judged, job=replace(found.job, facts=facts)))
+
+
+@pytest.mark.parametrize(("outcomes", "verdict", "standing"), [
+    (("pass",) * 5, "Incomplete: not all of the drawing was measured", "open"),
+    (("pass", "fail", "pass", "pass", "pass"), "Does not conform: one of 5 characteristics is not within the limits", "bad"),
+    ((None,) * 5, "Measured: no limits to decide on", "unknown"),
+])  # fmt: skip
+def test_a_part_of_which_not_all_was_measured_is_incomplete_at_best(
+    measured: PartMeasurement, outcomes: tuple[Outcome | None, ...], verdict: str, standing: str
+) -> None:
+    overview = judged_as(measured, outcomes, ["M6 thread"])
+    assert (overview.verdict, overview.standing) == (verdict, standing)
 
 
 @pytest.mark.parametrize(("outcomes", "verdict", "standing"), [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
+import re
 import tomllib
 from typing import Any
 
@@ -178,6 +179,19 @@ def test_what_the_job_says_too_must_say_the_same_and_an_uncertainty_may_only_be_
     same = job("ballbar", BALL_BAR, length_mm=404.2357, u_um=2.0, certificate={"number": "D-K-4711"})
     assert same.facts.artefact.u_um == 2.0
     assert job("ballbar", BALL_BAR, U_um=3.0, k=2.0).facts.artefact.u_um == 1.5
+
+
+@pytest.mark.parametrize(
+    ("k", "p", "u"), [("3.0", "0.9973", 1.0), ("4.303", "0.95", 3.0 / 1.96), ("2.65", "0.9545", 1.5)]
+)
+def test_a_factor_larger_than_that_of_a_normal_distribution_for_its_level_gives_no_smaller_u(
+    k: str, p: str, u: float
+) -> None:
+    found = files("ballbar", BALL_BAR)
+    xml = re.sub(r"(coverageFactor>)[\d.]+", rf"\g<1>{k}", found["artefact.xml"].decode())
+    xml = re.sub(r"(coverageProbability>)[\d.]+", rf"\g<1>{p}", xml)
+    artefact = job_of({**found, "artefact.xml": xml.encode()}).facts.artefact
+    assert artefact.u_um == pytest.approx(u, rel=1e-4)
 
 
 TWO = issued(value("Length A", "404.1", "0.003"), value("Length B", "404.2", "0.003"))

@@ -68,8 +68,8 @@ def test_the_uncertainty_of_every_face_is_u_over_the_factor_that_the_heading_say
     found = job(GAUGE, "certificate.csv", CERTIFICATE)
     assert found.points.columns["reference_u_um"].tolist() == [0.05, 0.06, 0.07, 0.08] * 2
     assert "reference_U_um" not in found.points.columns
-    other = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "Expanded uncertainty [nm]; k = 2.5"))
-    assert other.points.columns["reference_u_um"][3] == pytest.approx(0.16e-3 / 2.5, rel=1e-12)
+    other = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "Expanded uncertainty [nm]; k = 3"))
+    assert other.points.columns["reference_u_um"][3] == pytest.approx(0.16e-3 / 3, rel=1e-12)
     small = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "u (µm)"))
     assert small.points.columns["reference_u_um"].tolist() == [0.10, 0.12, 0.14, 0.16] * 2
 
@@ -147,9 +147,18 @@ def test_what_does_not_fit_is_refused(recording: str, certificate: str, kind: st
 
 
 def test_a_table_divides_by_two_and_a_quarter() -> None:
-    assert with_standard_uncertainty({"U_um": 4.5, "k": 2.25})["u_um"] == 2.0
-    growing = with_standard_uncertainty({"U_um": "0.45 + L/400", "k": 2.25})["u_um"]
-    assert (growing.fixed_um, growing.per_mm) == pytest.approx((0.2, 1 / 900))
+    assert with_standard_uncertainty({"U_um": 4.5, "k": 1.5})["u_um"] == 3.0
+    growing = with_standard_uncertainty({"U_um": "0.45 + L/400", "k": 1.5})["u_um"]
+    assert (growing.fixed_um, growing.per_mm) == pytest.approx((0.3, 1 / 600))
+
+
+@pytest.mark.parametrize(("k", "u"), [(2.0, 0.5), (2.58, 1 / 2.58), (3.0, 1 / 3), (2.65, 1 / 1.96), (4.303, 1 / 1.96)])
+def test_a_factor_of_no_normal_distribution_says_that_degrees_of_freedom_are_few(k: float, u: float) -> None:
+    """GUM, table G.1: 2.576 of 99 %, 3 of 99.73 %; table G.2: 2.57 to 2.65 of 5, 4.303 of 2 degrees of freedom for 95 %."""
+    assert with_standard_uncertainty({"U_um": 1.0, "k": k})["u_um"] == pytest.approx(u, rel=1e-4)
+    heading = CERTIFICATE.replace("U (um) k=2", f"U (um) k={k}")
+    column = job(GAUGE, "certificate.csv", heading).points.columns["reference_u_um"]
+    assert column[0] == pytest.approx(0.1 * u, rel=1e-4)
 
 
 def test_degrees_of_freedom_stand_for_a_factor_where_none_is_stated() -> None:
@@ -176,10 +185,10 @@ def test_few_degrees_of_freedom_of_a_column_too(heading: str, over: float) -> No
         assert u == pytest.approx([one * 4.303 / 1.960 / over for one in (0.10, 0.12, 0.14, 0.16)], rel=2e-4)
 
 
-def test_a_heading_of_a_certificate_divides_by_two_and_a_quarter() -> None:
-    found = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "U (um) k=2.25"))
+def test_a_heading_of_a_certificate_divides_by_its_factor() -> None:
+    found = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "U (um) k=1.5"))
     assert found.points.columns["reference_u_um"][:4].tolist() == pytest.approx(
-        [u / 2.25 for u in (0.1, 0.12, 0.14, 0.16)]
+        [u / 1.5 for u in (0.1, 0.12, 0.14, 0.16)]
     )
 
 

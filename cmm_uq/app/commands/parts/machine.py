@@ -262,6 +262,9 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
                          fix="Give the machine's certificate, or read the job from its folder")  # fmt: skip
     stage("Analysing the machine's job", 0.02)
     read = job_of(attached) if attached else read_job(_machines_folder(job))
+    if denied := next(read.denials(), None):
+        raise CmmUqError(f"its {denied[0]} was not in calibration: {denied[1]}", where=f"{WHERE} job = {named!r}",
+                         fix=f"Mend {denied[2]} of that job, or calibrate the machine anew")  # fmt: skip
     found = evaluate_job(read, seed=seed)
     outcome = outcome_of(found, seed)
     if outcome.draws is None:

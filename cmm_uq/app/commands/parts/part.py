@@ -133,7 +133,10 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         digits=options.digits, seed=seed, asked=trials, warnings=(*of_part.warnings, *machine.warnings),
         files=files, influence=influence,
     )  # fmt: skip
-    return replace(found, warnings=(*found.warnings, *decided_without(found)))
+    if not (withheld := decided_without(found)):
+        return found
+    judged = tuple(one and one.not_passing for one in decisions)
+    return replace(found, judged=judged, withheld=withheld, warnings=(*found.warnings, *withheld))
 
 
 def affordable(draws: int, plan: Plan) -> int:

@@ -163,7 +163,7 @@ class OwnLobes(OwnFault, Harmonic):
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         self.whose()
-        return -lobes_of(normals_of(points), 3, _turned(points))
+        return -lobes_of(normals_of(points), 3, turned_back(points))
 
 
 class OwnForm(OwnFault, OfDirections):
@@ -185,14 +185,14 @@ class OwnForm(OwnFault, OfDirections):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         self.whose()
         normals = normals_of(points)
-        return -MICROMETRE * normals[:, :, None] * harmonics(normals, _turned(points))[:, None, :]
+        return -MICROMETRE * normals[:, :, None] * harmonics(normals, turned_back(points))[:, None, :]
 
 
-def harmonics(normals: Floats, turned: Floats | float) -> Floats:
-    """Of directions (n, 3), turned back about Z by angles, rad: all of :data:`HARMONICS`, (n, k), of mean square one."""
+def harmonics(normals: Floats, turned: Floats | float, of: Sequence[tuple[int, int]] = HARMONICS) -> Floats:
+    """Of directions (n, 3), turned back about Z by angles, rad: degrees and orders (k,) as (n, k), of mean square one."""
     azimuth, found = np.arctan2(normals[:, 1], normals[:, 0]) - turned, []
     polar = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
-    for degree, order in HARMONICS:
+    for degree, order in of:
         k = abs(order)
         legendre = scipy.special.lpmv(k, degree, np.cos(polar))
         log_ratio = scipy.special.gammaln(degree - k + 1) - scipy.special.gammaln(degree + k + 1)
@@ -216,7 +216,7 @@ def _flat(owner: FaultyArtefact, points: Points) -> tuple[Floats, Floats]:
     return np.asarray(poses.rotation @ normal), np.asarray(across)
 
 
-def _turned(points: Points) -> Floats:
+def turned_back(points: Points) -> Floats:
     return np.radians(points.columns.get(TURNED, np.zeros(len(points))))
 
 

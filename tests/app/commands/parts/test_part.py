@@ -26,6 +26,9 @@ from cmm_uq.base.messages import say
 from cmm_uq.certificate.origin import NO_FURTHER, as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.part.method import decided_without
+from cmm_uq.certificate.verify.decisions import check_part_decisions
+from cmm_uq.certificate.verify.figures import check_verdicts
+from cmm_uq.certificate.verify.given import Inquiry
 from cmm_uq.jobs.part.job import TABLES
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
@@ -244,6 +247,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
         "machine.further[]",
         "other_methods.",
         "reported.",
+        "decision.withheld",
     )
     assert {key for key in told - there if not key.startswith(sometimes)} == set()
 
@@ -363,11 +367,26 @@ def test_a_decision_says_of_what_no_uncertainty_is_stated(table: str, changes: d
     assert not decided_without(replace(there, measured=None))
 
 
-def test_what_a_decision_lacks_is_a_warning_of_the_report() -> None:
-    environment, form = {"u_part_k": 0.0, "u_scales_k": 0.0}, {"field_um": 0.0, "roughness_um": 0.0}
-    job = plate_of(by_results(), np.zeros((60, 3)), environment=environment, form=form, **THERE)
-    (told,) = (str(text) for text in evaluate_part(job, PartOptions(trials=1000)).warnings if "Decided" in str(text))
-    assert told.endswith(": temperatures and form and roughness of the part.")
+@pytest.mark.parametrize(("environment", "form", "lacks"), [
+    ({}, {}, ""), ({"scales_cte_per_k": 1e-5}, {}, ""), ({"scales_cte_per_k": 1e-5, "u_scales_k": 0.0}, {}, "temperatures"),
+    ({"u_part_k": 0.0}, {"field_um": 0.0, "roughness_um": 0.0}, "temperatures and form and roughness of the part"),
+])  # fmt: skip
+def test_nothing_conforms_by_an_uncertainty_that_lacks_what_the_job_does_not_state(
+    environment: dict[str, float], form: dict[str, float], lacks: str
+) -> None:
+    """A plate measured without an error, which passed with a warning."""
+    changes = {name: TABLES[name] | table for name, table in (("environment", environment), ("form", form))}
+    found = evaluate_part(plate_of(by_results(), np.zeros((60, 3)), **changes, **THERE), PartOptions(trials=1000))
+    told = [f"Nothing is called conforming, for the job states no uncertainty of these: {lacks}."] if lacks else []
+    assert [str(text) for text in found.withheld] == told == [str(one) for one in found.warnings if str(one) in told]
+    assert {*found.outcomes} == ({"undecided"} if lacks else {"pass", "undecided"})
+    data = json.loads(as_json(part_results(found)))
+    assert data["decision"]["outcome"] == data["verdicts"]["overall"] == "undecided"
+    assert {text for one in data["verdicts"]["statements"] for text in one["missing"]} == {*told}
+    inquiry = Inquiry()
+    check_part_decisions(inquiry, data, "results.json")
+    check_verdicts(inquiry, data, "results.json")
+    assert not inquiry.findings
 
 
 def test_a_check_says_what_would_stop_the_command(tmp_path: Path) -> None:

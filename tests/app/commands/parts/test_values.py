@@ -16,6 +16,7 @@ from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_pa
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.jobs.part.job import part_of, read_part
+from cmm_uq.jobs.verdicts import gravest
 from tests.jobs.part.test_qif import document
 from tests.part_machines import by_certificate, plate_files, plate_of
 from tests.part_reports import put
@@ -69,6 +70,9 @@ def test_the_report_says_whose_values_these_are_and_what_was_not_in_them() -> No
         "values": [{"name": name, "where": f"report.csv line {line}"} for line, name in enumerate("1235", 2)],
     }  # fmt: skip
     assert data["part"]["not_measured"] == ["4"]
+    whole, last = data["decision"]["outcome"], data["verdicts"]["statements"][-1]
+    assert (last["name"], last["outcome"], last["missing"]) == ("4", "incomplete", ["it was not measured"])
+    assert whole == data["verdicts"]["overall"] == gravest([*found.outcomes, "incomplete"])
     assert [one["name"] for one in data["characteristics"]] == ["1", "2", "3", "5"]
     assert [one["value_is"] for one in data["characteristics"]] == ["mean", "stated", "stated", "mean"]
     assert any(text.startswith("Values are those of the report report.csv (CSV)") for text in data["warnings"])
