@@ -28,7 +28,7 @@ from cmm_uq.jobs.importing.format import (
     sources_of,
     unit_named,
 )
-from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
+from cmm_uq.jobs.importing.header import named_alike, plain_words, without_unit, words_of
 
 _FIGURE = re.compile(r"[±<>≤≥~]?\s*([+-]?\d[\d .,'’]*|[+-]?[.,]\d+)(?:[eE][+-]?\d+)?")
 _GROUPS = {sign: re.compile(rf"(?<=\d)[{other} '’](?=\d{{3}})") for sign, other in ((",", "."), (".", ","))}
@@ -108,6 +108,7 @@ class CutSheet:
         self.block_of = {row: block for block in self.blocks for row in block.rows}
         for block in self.blocks:
             self.places_of |= self._places_beside(block)
+        self.ends = {row for block in self.blocks for row in block.rows[named_alike(self.sheet.rows, block.rows) :]}
 
     def at(self, row: int, i: int | None = None) -> str:
         """Place of a row or a cell, for messages."""
@@ -192,7 +193,8 @@ class CutSheet:
             return "text"
         if self._is_head(i) and i + 1 < len(self.sheet.rows):
             units = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i + 1] if cell != ""]
-            if any((self.figure(i + 1, k) or (0, 1))[1] < 1 for k in numbers) or (
+            below = i + 1 + (len(units) == 1 and i + 2 < len(self.sheet.rows))  # below a title
+            if any((self.figure(below, k) or (0, 1))[1] < 1 for k in numbers) or (
                 units and all(map(unit_named, units))
             ):
                 return "text"

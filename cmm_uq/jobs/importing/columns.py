@@ -6,6 +6,7 @@ together, numbers of measurement, point and repeat, follows from columns of the 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
@@ -19,13 +20,25 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
+from cmm_uq.jobs.importing.factors import Label
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, NotReadError, Sheet, WrittenUnit
-from cmm_uq.jobs.importing.header import NAME, REMARK, SUMMARY, Header, filled_down, is_summary, shown, text_of
+from cmm_uq.jobs.importing.header import (
+    NAME,
+    REMARK,
+    SUMMARY,
+    Header,
+    filled_down,
+    is_summary,
+    named_alike,
+    shown,
+    text_of,
+)
 from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
 
 LARGEST_MACHINE_MM = 40_000.0  # longest diagonal of a measuring machine: gantries of 30 m are the largest made
 SIGNS = {".": say("point"), ",": say("comma")}
 _SHOWN = 15
+_DECIMAL = re.compile(r"\d[.,]\d")
 
 Written = Mapping[str, Sequence[tuple[Floats, WrittenUnit | None, int]]]
 """Values of each column as written, with its unit and its index."""
@@ -76,8 +89,10 @@ def columns_of(
     numbers, facts = table.numbers(sign)
     lines = np.repeat(np.array([sheet.lines[i] for i in table.rows], dtype=np.int64), header.points)
     labels = table.labels()
-    if not points and POINT not in numbers and labels and all(label.isdecimal() for label in labels):
-        numbers[POINT] = np.array([float(label) for label in labels])
+    named = [header.headings[i] for i in header.columns.get(NAME, ())]
+    for label in (one for one in labels if not points and POINT not in numbers and one.words in named[:1]):
+        if all(one.isdecimal() for one in label.values):
+            numbers[POINT] = np.array([float(one) for one in label.values])
     if points:
         xyz = np.column_stack([values[name] for name in COORDINATES])
         numbers, further = completed(numbers, labels, xyz, keys, table.start)
@@ -117,7 +132,13 @@ class ExportTable:
         self.cells: Sequence[Sequence[Cell]] = []
         if not set(map(len, body)) - {width}:
             self.cells = list(zip(*body, strict=True))
-        if not self.cells or any("" in self.cells[i] for i in needed) or any(map(is_summary, body)):
+        self.called = named_alike(sheet.rows, self.rows)  # rows ahead of results
+        if (
+            not self.cells
+            or self.called < len(body)
+            or any("" in self.cells[i] for i in needed)
+            or any(map(is_summary, body))
+        ):
             self.rows, self.after = self._usable(needed)
             if not self.rows:
                 fix = "Export the table with its figures"
@@ -138,9 +159,11 @@ class ExportTable:
             row = sheet.rows[i]
             if not any(cell != "" for cell in row):
                 continue
-            if is_summary(row):
+            if is_summary(row) or i >= self.header.first + self.called:
                 self.left_out.append(shown(sheet, i, SUMMARY))
-            elif all(place >= len(row) or row[place] == "" for place in needed):
+            elif all(place >= len(row) or row[place] == "" for place in needed) or (
+                any(place >= len(row) or row[place] == "" for place in needed) and not any(map(_figured, row))
+            ):
                 text.append(i)
             else:
                 _refuse_another_length(sheet, self.header, i, needed, self.where)
@@ -171,7 +194,10 @@ class ExportTable:
             cells, unit = split_units(self.cells[i], at)
             if name not in COORDINATES and not any(cell != "" and is_number(cell) for cell in cells):
                 return []
-            values = values_of(cells, sign, at, MEASURE if name in COORDINATES else GIVE_OR_REMOVE)
+            try:
+                values = values_of(cells, sign, at, MEASURE if name in COORDINATES else GIVE_OR_REMOVE)
+            except CmmUqError as error:
+                raise _of_another_table(error) if name not in COORDINATES else error from None
             parts.append((values, unit or self.header.units.get(i), i))
         return parts
 
@@ -228,7 +254,10 @@ class ExportTable:
         columns, facts, points = {}, [], self.header.points
         for name in NUMBERS:
             for i in self.header.columns.get(name, ())[:1]:
-                values, named = numbered(filled_down(self.cells[i]), sign, partial(self.place, i))
+                try:
+                    values, named = numbered(filled_down(self.cells[i]), sign, partial(self.place, i))
+                except CmmUqError as error:
+                    raise _of_another_table(error) from None
                 columns[name] = np.repeat(values, points)
                 if named:
                     facts.append(Fact(f"{name}_names", say("Names in {column}", column=Verbatim(name)), named))
@@ -240,9 +269,13 @@ class ExportTable:
                 facts.append(Fact("numbering", say("Numbering"), say("each row is one measurement")))
         return columns, facts
 
-    def labels(self) -> list[str] | None:
-        columns = self.header.columns.get(NAME, ())
-        return [*map(text_of, self.cells[columns[0]])] if len(columns) == 1 and self.header.points == 1 else None
+    def labels(self) -> list[Label]:
+        """Names and whole numbers that stand beside points, in the columns of names and in those that are not known."""
+        names = self.header.columns.get(NAME, ())
+        beside = () if self.header.points > 1 else sorted({*names, *self.header.unused})
+        cells = [(i, self.header.headings[i], [*map(text_of, filled_down(self.cells[i]))]) for i in beside]
+        whole = [one for one in cells if one[0] in names or not any(map(_DECIMAL.search, one[2]))]
+        return [Label(name, tuple(own)) for _, name, own in whole if "" not in own]
 
     def facts(self, left_out: Sequence[str]) -> list[Fact]:
         """The kind of table, and what of it is not used."""
@@ -257,6 +290,15 @@ class ExportTable:
         if self.after:
             facts.append(Fact("after", say("Lines of text after the table"), number(self.after)))
         return [*facts, *left_out_fact(self.left_out)]
+
+
+def _of_another_table(error: CmmUqError) -> NotReadError:
+    """Of a cell beside coordinates, whose row may be something else, as the centre below the points of a ball."""
+    return NotReadError(error.problem, where=error.where, fix=error.fix)
+
+
+def _figured(cell: Cell) -> bool:
+    return cell != "" and is_number(cell)
 
 
 def _first_of(words: Sequence[str], join: Callable[[Sequence[Text]], Text]) -> Text:

@@ -8,136 +8,252 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet, heading
-from cmm_uq.jobs.importing.factors import hint, places, ways_of
-from cmm_uq.jobs.importing.format import WrittenUnit
-from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
-from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said, without_sums, words_above
+from cmm_uq.jobs.importing.factors import hint, ways_of
+from cmm_uq.jobs.importing.format import NotReadError
+from cmm_uq.jobs.importing.header import without_unit
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said, said_by, words_above
 
 _MOST = 0.8  # of figures: where fewer are there, they may be of something else
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
-_LETTER = re.compile(r"(?<![A-Za-zÀ-ÿ])([xyzXYZ])(?![A-Za-zÀ-ÿ])|^([XYZ])(?=[A-Z]?[a-z])")
-_ENDS = re.compile(r"(.*?)[\s_.:/-]*([XYZ])(?:[- ]?(?:axis|achse|axe|wert|value|[ck]oord\w*\.?))?", re.IGNORECASE)
+_SAME = 2.0  # between what is nominal and what is measured; or a part of 0.002
+_EXACT = ("nominal", "reference", "target")
+_WIDE = 4.0  # of deviations and tolerances, in the unit of the file
+_FEW = 3  # places, which may be round by chance
+_UNIT_VECTOR = 2e-3  # to which directions have the length 1
+_LETTER = re.compile(r"(?<![A-Za-zÀ-ɏ])([xyzXYZ])(?![A-Za-zÀ-ɏ])")
+_EQUAL = re.compile(r"\s*[=:]\s*[-+]?\d")
+_COUNTED = re.compile(r"\d+|(?<![^\W\d_])[A-Za-z](?![^\W\d_])")
+
+
+class EitherError(NotReadError):
+    """Two columns may be the measured one of an axis; what else a sheet holds may be read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triple:
+    """Figures (n, 3) of three columns, or of a column in which each of three has a row; and their head without the axis."""
+
+    columns: tuple[FigureColumn, ...]
+    values: Floats
+    head: str
+    summed: bool = False  # whether they are nominal values and deviations together
+
+    @property
+    def role(self) -> str | None:
+        return next((c.role for c in self.columns if c.role), None)
+
+    @property
+    def directed(self) -> bool:
+        """Whether they are directions, all of the length 1."""
+        length = np.linalg.norm(self.values[np.isfinite(self.values).all(axis=1)], axis=1)
+        length = length[length > 0]
+        return len(length) > 0 and bool((np.abs(length - 1) < _UNIT_VECTOR).all())
+
+    @property
+    def wide(self) -> bool:
+        """Whether they are as far apart as places are, and deviations are not."""
+        unit, extent = self.columns[0].unit, np.nanmax(self.values, axis=0) - np.nanmin(self.values, axis=0)
+        return bool(extent.max() > _WIDE or (unit is not None and unit.name not in SMALL and extent.max() > 0))
+
+    @property
+    def grain(self) -> float:
+        """The largest power of ten of which all figures are multiples."""
+        own = np.abs(self.values[np.isfinite(self.values)])
+        powers = [10.0**k for k in range(3, -9, -1)]
+        return next((g for g in powers if np.abs(own / g - np.round(own / g)).max() < 1e-6), powers[-1])
+
+    @property
+    def step(self) -> float:
+        """Of the last printed digit."""
+        return min(c.step for c in self.columns) * 5
+
+    @property
+    def shown(self) -> str:
+        return ", ".join(dict.fromkeys(c.heading or f"column {c.i + 1}" for c in self.columns))
+
+    @property
+    def several(self) -> int:
+        """How many of them differ."""
+        return len(np.unique(self.values, axis=0))
+
+    def near(self, other: Triple) -> bool:
+        """Whether they are the same places, nominal or measured."""
+        away, both = np.abs(self.values - other.values), np.isfinite(self.values + other.values)
+        return bool(both.any() and (away[both] <= np.maximum(_SAME, 0.002 * np.abs(self.values[both]))).all())
+
+    def minus(self, other: Triple, deviations: Triple) -> bool:
+        """Whether deviations are these less others to the printed digits."""
+        alike = len(self.columns) == len(other.columns) == len(deviations.columns)
+        each = zip(deviations.columns, self.columns, other.columns, strict=True) if alike else ()
+        return alike and all(any(d.agrees(a, b, f) for f in d.factors(a)) for d, a, b in each)
 
 
 def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
-    """Places of rows below one head that names X, Y and Z, once or for several points side by side."""
-    columns = columns_in(grid, blocks, rows)
-    checked, triples = 0, []
-    for letter in "xyz":
-        own = [c for c in columns if c.role != "summary" and c.may_be_length and _axis(c.path) == letter]
-        own = [c for c in own if not _directed(c.path)]
-        nominal = _nominal_of(own)
-        checked += len(nominal) // 2
-        rest = [c for c in own if c.i not in nominal and c.role not in ("nominal", "deviation", "reference")]
-        triples.append(without_sums(rest) or rest)
-    bare = _bare(grid, columns, rows)
-    triples = [[c] for c in bare] or triples
-    every = [c for own in triples for c in own]
-    if not triples[0] or len({*map(len, triples)}) > 1 or len({c.unit.name for c in every if c.unit}) > 1:
+    """Places of rows below a head that names X, Y and Z, once or for several points side by side, or of columns alike."""
+    rows = [row for row in rows if row not in grid.ends]
+    columns = columns_in(grid, blocks, rows) if rows else []
+    lengths = [c for c in columns if c.may_be_length]
+    named = _named(lengths)
+    triples, checked = _measured(named or _bare(lengths), grid.at(min(rows, default=0)))
+    every = [c for own in triples for c in own.columns]
+    if not triples or len({c.unit.name for c in every if c.unit}) > 1:
         return None
-    if not bare and len({tuple(map(_LETTER.sub, [" "] * len(c.path), c.path)) for c in triples[0]}) < len(triples[0]):
-        return None  # side by side, and nothing tells them apart
     reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
-    reading.bare = [c.i + 1 for c in bare]
-    reading.taken = {f"{letter}_mm": own for letter, own in zip("xyz", triples, strict=True)}
+    alone = not checked and sum(own.wide for own in named) == 1
+    reading.beside_lengths = alone and bool(_COUNTED.sub("", triples[0].head).strip())
+    reading.bare = [] if named else [c.i + 1 for c in every]
+    reading.others = [*grid.ends]
+    reading.taken = {f"{letter}_mm": [own.columns[k] for own in triples] for k, letter in enumerate("xyz")}
     reading.collect(grid, rows, columns)
     for k, row in enumerate(rows):
-        for three in zip(*triples, strict=True):
-            xyz = tuple(float(c.values[k]) for c in three)
-            if all(np.isfinite(xyz)):
-                reading.add(row, k, three[0], triples[0], xyz)
-            elif any(np.isfinite(xyz)):
+        for own in triples:
+            if np.isfinite(own.values[k]).all():
+                reading.add(row, k, own.columns[0], [one.columns[0] for one in triples], tuple(own.values[k].tolist()))
+            elif np.isfinite(own.values[k]).any():
                 _refuse_gaps(grid, rows, every)
                 return None
     for labels in reading.labels:
         labels |= {key: _LETTER.sub(" ", text).strip() or text for key, text in labels.items() if key[0] == "head"}
-    places = np.array(reading.figures).reshape(-1, 3)
-    alike = len(places) > 2 and all(like(places[:, 0], places[:, k]) for k in (1, 2))  # lengths on lines X, Y, Z
-    return reading if len(places) and not alike and _apart(places, reading.unit) else None
+    return reading if _places(np.array(reading.figures).reshape(-1, 3)) else None
 
 
-def _bare(grid: CutSheet, columns: Sequence[FigureColumn], rows: Sequence[int]) -> list[FigureColumn]:
-    """Three columns beside names, in a file that is nothing but them: each differs by more than a diameter does."""
-    fine = [c for c in columns if c.step < 1]
-    alone = len(grid.blocks) == 1 and not grid.blocks[0].head and len(rows) == len(grid.blocks[0].rows) > 3
-    if not alone or len(fine) != 3 or len(columns) > 4 or grid.width > fine[-1].i + 1 or fine[-1].i - fine[0].i != 2:
+def _places(xyz: Floats) -> bool:
+    """Whether figures (n, 3) are no lengths on lines along X, Y and Z."""
+    return len(xyz) > 0 and not (len(xyz) > 2 and all(like(xyz[:, 0], xyz[:, k]) for k in (1, 2)))
+
+
+def _named(columns: Sequence[FigureColumn]) -> list[Triple]:
+    """Columns whose heads are the same but for a letter x, y or z."""
+    found: dict[tuple[str, str], dict[str, list[FigureColumn]]] = {}
+    for c in columns:
+        text = " ".join(without_unit(one.replace("\n", " "))[0].strip() for one in c.path).strip()
+        for match in re.finditer("[xyzXYZ]", text):
+            rest = text[: match.start()].casefold(), text[match.end() :].casefold()
+            found.setdefault(rest, {}).setdefault(match[0].lower(), []).append(c)
+    whole = [(rest, own) for rest, own in found.items() if len(own) == 3 and len({*map(len, own.values())}) == 1]
+    forms = [_COUNTED.sub("0", " ".join(rest)) for rest, _ in whole]
+    if any(len(own) == 2 and _COUNTED.sub("0", " ".join(rest)) in forms for rest, own in found.items()):
+        return []  # a coordinate of one of several points is called otherwise
+    threes = ((three, rest) for rest, own in whole for three in zip(*(own[axis] for axis in "xyz"), strict=True))
+    return [_three(three, " ".join(rest).strip()) for three, rest in threes]
+
+
+def _bare(columns: Sequence[FigureColumn]) -> list[Triple]:
+    """Three columns side by side that no head names, the only ones of a file that may be coordinates."""
+    fine = [c for c in columns if c.step < 1 and c.full and not "".join(c.path).strip()]
+    every = [_three(fine[k : k + 3], "") for k in range(len(fine) - 2) if fine[k + 2].i - fine[k].i == 2]
+    directed = {c.i for own in every if own.directed for c in own.columns}
+    left = [c for c in fine if c.i not in directed]
+    beyond = left[3:]
+    extents = [np.ptp(c.values) for c in left]
+    if len(left) < 3 or left[2].i - left[0].i != 2 or len(left[0].values) < 4 or sorted(extents[:3])[1] < 4:
         return []
-    if fine[0].i > 1 or not all(c.full and np.ptp(c.values) > 1 for c in fine):
+    if beyond and not (max(extents[3:]) == 0 < extents[2] or (max(extents[3:]) < 1 < extents[2])):
         return []
-    alike = any(like(a.values, b.values, 1) for a, b in permutations(fine, 2))
-    again = len({grid.text(row, 0) for row in rows}) < len(rows)
-    again = again or places(np.column_stack([c.values for c in fine])).max() + 1 < len(rows)
-    return [] if alike or again else fine
+    alike = any(like(a.values, b.values, 1) for a, b in combinations(left[:3], 2))
+    return [] if alike else [_three(left[:3], "")]
 
 
-def _nominal_of(columns: Sequence[FigureColumn]) -> set[int]:
-    """Nominal values and deviations beside measured ones, which are their sum."""
-    found: set[int] = set()
-    values, fine = np.array([c.values for c in columns]), np.array([c.step for c in columns])
-    slack = np.add.outer(fine, fine) + 1e-6
-    for d in columns:
-        if d.role not in (None, "deviation") or not np.any(d.values) or not np.isfinite(d.values).any():
-            continue
-        at = int(np.nanargmax(np.abs(d.values)))  # the row in which the fewest sums hold by chance
-        apart = np.subtract.outer(values[:, at], values[:, at])
-        for f in dict.fromkeys(f for c in columns for f in d.factors(c)):
-            for i, k in np.argwhere(~(np.abs(apart - d.values[at] * f) > d.step * f + slack)):
-                measured, nominal = columns[i], columns[k]
-                words = measured.role not in ("nominal", "reference") and nominal.role != "measured"
-                other = d is not measured and d is not nominal and measured is not nominal
-                if other and words and not {nominal.i, d.i} <= found and f in d.factors(nominal):
-                    found |= {nominal.i, d.i} if d.agrees(measured, nominal, f) else set()
-    return found
+def _three(columns: Sequence[FigureColumn], head: str) -> Triple:
+    return Triple(tuple(columns), np.column_stack([c.values for c in columns]), head)
 
 
-def _apart(xyz: Floats, unit: WrittenUnit | None) -> bool:
-    """Whether figures may be places, and no deviations."""
-    return bool(len(xyz) == 1 or np.ptp(xyz, axis=0).max() > 4 or (unit is not None and unit.name not in SMALL))
+def _measured(triples: Sequence[Triple], where: str) -> tuple[list[Triple], int]:
+    """Those that are measured, of several points or runs side by side, and how many arithmetic confirms.
+
+    Of two that are the same places the nominal one is told by its deviations, by words, or by its figures, which are rounder.
+    """
+    rest = [t for t in triples if not t.directed and np.ptp(t.values, axis=1).any()]
+    wide = [t for t in rest if t.wide]
+    one_place = [t for t in rest if len(t.columns) == 1 and np.nanmax(np.abs(t.values)) > _WIDE]  # measured again
+    large = wide or one_place
+    nominal, confirmed = set[Triple](), set[Triple]()
+    for a, b in permutations(large, 2):
+        told = (b.role in _EXACT) - (a.role in _EXACT)
+        told = told or (a.role == "measured") - (b.role == "measured")
+        if told >= 0 and {a, b}.isdisjoint(nominal) and a.near(b):
+            others = [d for d in rest if d is not a and d is not b]
+            checks = any(a.minus(b, d) for d in others)
+            if told > 0 and not checks and any(b.minus(a, d) for d in others):
+                what = f"{a.shown} is called measured, and by the deviations {b.shown} is"
+                raise EitherError(what, where=where, fix=said_by("x_mm", a.columns[:1], ", and y_mm and z_mm"))
+            confirmed |= {a} if checks else set()
+            rounder = a.grain * 5 < b.grain or 2 * b.several <= a.several
+            rounder = rounder and a.several > _FEW and _COUNTED.sub("0", a.head) != _COUNTED.sub("0", b.head)
+            if checks or told > 0 or rounder:
+                nominal.add(b)
+    left = [t for t in large if t not in nominal and t.role != "deviation"]
+    left = [t for t in left if t.role != "summary"] or [t for t in left if t in confirmed]
+    if deviations := [t for t in rest if t.role == "deviation" and t not in large] if not nominal else []:
+        left = [t for t in left if t.role not in _EXACT] or _summed(left, deviations, where)
+    left = [t for t in left if t.role not in _EXACT or t.summed]
+    small = min((t.grain for t in rest if t not in large and t.several > 1), default=np.inf)
+    if round_ := [
+        t for t in left if not t.summed and t.role is None and t.several > _FEW and small * 5 < t.grain > t.step
+    ]:
+        what = f"{round_[0].shown} may be nominal values, for all are round, and no measured ones stand beside them"
+        raise EitherError(what, where=where, fix=said_by("x_mm", round_[0].columns[:1], ", and y_mm and z_mm"))
+    if len({_COUNTED.sub("0", t.head) for t in left}) > 1:
+        left = [t for t in left if not t.head] or left
+    counted = len({_COUNTED.sub("0", t.head) for t in left}) < 2 and len({t.head for t in left}) == len(left)
+    if len(left) > 1 and not (counted or _rigid(left)):
+        what = f"{left[0].shown} and {left[1].shown} may both be measured places"
+        raise EitherError(what, where=where, fix=said_by("x_mm", left[0].columns[:1], ", and y_mm and z_mm"))
+    return left, len(confirmed)
 
 
-def _axis(path: Sequence[str]) -> str | None:
-    """The axis that the lowest text above a column names."""
-    for text in reversed(path):
-        if found := {(m[1] or m[2]).lower() for m in _LETTER.finditer(without_unit(text)[0].strip())}:
-            return found.pop() if len(found) == 1 else None
-    return None
+def _summed(nominal: Sequence[Triple], deviations: Sequence[Triple], where: str) -> list[Triple]:
+    """Nominal places with their deviations, where no measured place stands beside them."""
+    if len(nominal) > 1:
+        what = f"{nominal[0].shown} and {nominal[1].shown} may both be the nominal values of what was measured"
+        raise EitherError(what, where=where, fix="Keep the columns of one of them, with their deviations")
+    if not nominal or len(deviations) != 1 or len(nominal[0].columns) != len(deviations[0].columns):
+        return []
+    nom, dev = nominal[0], deviations[0]
+    factors = [d.factors(n) for d, n in zip(dev.columns, nom.columns, strict=True)]
+    if any(one != factors[0] for one in factors) or len(factors[0]) > 1 < len({c.unit for c in dev.columns}):
+        return []
+    return [replace(nom, values=nom.values + dev.values * factors[0][0], summed=True)]
 
 
-def _directed(path: Sequence[str]) -> bool:
-    """Whether a column is part of a direction."""
-    of, words = words_of("axis"), {word for text in path for word in plain_words(text)}
-    return bool(words & (of["normal"] | of["approach"] - {"axis"})) and not words & of["coordinate"]
+def _rigid(triples: Sequence[Triple]) -> bool:
+    """Whether what stands side by side in each row is an artefact: the distances are the same in all rows."""
+    apart = [np.linalg.norm(a.values - b.values, axis=1) for a, b in combinations(triples, 2)]
+    return all(np.nanmin(d) > _SAME and np.ptp(d[np.isfinite(d)]) < 0.1 and len(d) > 2 for d in apart)
 
 
 def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
-    """Places of which each coordinate has a row, called X, Y or Z in a column or at the end of a name."""
+    """Places of which each coordinate has a row that names X, Y or Z in one of its cells."""
     for i in range(grid.width):
-        ends = [_ENDS.fullmatch(grid.text(row, i)) for row in rows]
-        stems = [end[1] for end in ends if end]
-        if len(stems) < 3 or "".join(end[2].upper() for end in ends if end) != "XYZ" * (len(stems) // 3):
+        named = [
+            (row, text, found[0]) for row in rows if len(found := [*_LETTER.finditer(text := grid.text(row, i))]) == 1
+        ]
+        named = [one for one in named if not _EQUAL.match(one[1], one[2].end())]
+        own = [row for row, _, _ in named]
+        stems = [f"{text[: m.start()]} {text[m.end() :]}".strip(" \t_.:/=-") for _, text, m in named]
+        if len(own) < 3 or "".join(m[0].upper() for _, _, m in named) != "XYZ" * (len(own) // 3):
             continue
-        own = [row for row, end in zip(rows, ends, strict=True) if end]
         above = heading(blocks[0].paths[i]) if i < len(blocks[0].paths) else ""
         if not any(stems) and any(map(str.isdigit, above)):
             stems = [above] * len(stems)  # the head of its own of each feature
-        columns = [c for c in columns_in(grid, blocks, own) if c.i != i]
+        columns = [c for c in columns_in(grid, blocks, own) if c.i != i and c.may_be_length]
         _refuse_gaps(grid, own, [c for c in columns if c.role == "measured"])
-        columns = [c for c in columns if c.full]
-        fine = [c for c in columns if c.step < 1]
-        nominal = _nominal_of(fine)
-        unnamed = [c for c in fine if c.role is None]
-        measured = [c for c in fine if c.role == "measured"] or [c for c in unnamed if c.i not in nominal] or unnamed
-        if not measured or (not nominal and len(measured) > 1 and any(c.role is None for c in measured)):
+        fine = [c for c in columns if c.full and c.step < 1]
+        own_triples = [Triple((c,), c.values.reshape(-1, 3), c.heading or f"column {c.i + 1}") for c in fine]
+        triples, checked = _measured(own_triples, grid.at(own[0]))
+        if not triples or not _places(np.concatenate([t.values for t in triples])):
             continue
-        reading = SheetReading("points", measured[0].unit or grid.unit_beside(own), None, len(nominal) // 2)
-        reading.taken, reading.others = {"x_mm, y_mm, z_mm": measured}, rows
+        measured = [t.columns[0] for t in triples]
+        reading = SheetReading("points", measured[0].unit or grid.unit_beside(own), None, checked)
+        others = [r for r, kind in enumerate(grid.kinds) if kind == "figures" and not _has_axis(grid, r)]
+        reading.taken, reading.others = {"x_mm, y_mm, z_mm": measured}, [*rows, *others]
         reading.collect(grid, own, columns, [i, *(c.i for c in fine)])
         if not _threes([{**one, ("name", ""): stem} for one, stem in zip(reading.beside, stems, strict=True)]):
             return None
@@ -147,8 +263,14 @@ def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -
             for c in measured:
                 reading.add(own[k], k, c, measured, tuple(map(float, c.values[k : k + 3])))
                 reading.labels[-1] |= {("column", f"{i} "): stems[k]} if any(stems) else {}
-        return reading if _apart(np.array(reading.figures), reading.unit) else None
+        return reading
     return None
+
+
+def _has_axis(grid: CutSheet, row: int) -> bool:
+    """Whether a row names an axis, or has no name at all."""
+    texts = [grid.text(row, k) for k, f in enumerate(grid.figures[row]) if f is None]
+    return not any(texts) or any(map(_LETTER.search, texts))
 
 
 def _refuse_gaps(grid: CutSheet, rows: Sequence[int], columns: Sequence[FigureColumn]) -> None:
@@ -161,9 +283,11 @@ def _refuse_gaps(grid: CutSheet, rows: Sequence[int], columns: Sequence[FigureCo
 
 def _threes(labels: Sequence[Mapping[tuple[str, str], str]]) -> bool:
     """Whether every three rows have a name of their own, or the number of a point, and none names each otherwise."""
-    named = False
+    named = any(map(str.isdigit, labels[0]["name", ""]))
     for key in labels[0]:
         own = [one.get(key, "") for one in labels]
+        if [text.upper() for text in own[:3]] == ["X", "Y", "Z"]:
+            continue  # the axis again
         of = hint(words_above(key), lengths=False)
         if key[0] == "column" and of in ("line", "point") and own[0] != own[1] != own[2]:
             return False  # lines along the axes

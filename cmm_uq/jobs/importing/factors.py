@@ -1,8 +1,8 @@
-"""What labels count: lines and runs of lengths; measurements, points and repeats of places.
+"""What labels count: lines and runs of lengths; of places see :mod:`~cmm_uq.jobs.importing.grouping`.
 
 A label is a column of names or numbers, a title, a head above a column, a sheet, or a part of a name (``POS1_BALL2_M3``).
-Words say what most of them count; figures say the rest: what differs where the same place, or the same length, is met again is
-a repeat, what the nominal length fixes counts lengths. Nothing is taken where two observations would be one.
+Words say what most of them count; figures say the rest: what differs where the same length is met again is a repeat, what the
+nominal length fixes counts lengths. Nothing is taken where two observations would be one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.points import Ints
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
@@ -23,11 +23,10 @@ _MARKS = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
 _TOKEN = re.compile(r"[^\W_]+")
 _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
 _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
-_SAME_PLACE_MM = 0.5
-_RIGID_MM = 0.1
-_PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
-_LETTERS = {*"ABCDEFGHabcdefgh"}  # of balls
-_SHORT = {"m": LINE, "p": POINT, "b": POINT, "k": POINT, "r": RUN, "w": RUN, "l": LINE}
+LETTERS = {*"ABCDEFGHabcdefgh"}  # of balls
+# in names, ahead of their numbers
+_SHORT = {"m": LINE, "p": POINT, "b": POINT, "k": POINT, "r": RUN, "w": RUN, "l": LINE, "bar": LINE, "stab": LINE,
+          "barre": LINE, "barra": LINE}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class Label:
     sort: str = "column"  # or title, head, sheet, part
 
 
-_Counted = tuple[Label, Ints, str | None]  # a label, the number of its value for each observation, and what it counts
+Counted = tuple[Label, Ints, str | None]  # a label, the number of its value for each observation, and what it counts
 
 
 def ways_of(values: Sequence[str]) -> list[int] | None:
@@ -67,7 +66,7 @@ def counted(label: Label, *, lengths: bool) -> str | None:
     if label.sort == "title" and not label.words:
         every = {hint(value, lengths=lengths) for value in {*label.values}}
         return every.pop() if len(every) == 1 else None
-    if label.sort == "part" and {*label.values} <= _LETTERS:
+    if label.sort == "part" and {*label.values} <= LETTERS:
         return POINT
     words = (label.words, label.values[0]) if label.sort in ("title", "part") else label.values[:1]
     found = next((found for text in words if (found := hint(text, lengths=lengths))), None)
@@ -97,7 +96,7 @@ def hint(text: str, *, lengths: bool) -> str | None:
     exact = [fit for fit in fits if fit[0] == int(fit[0])]
     if fits:
         return max(exact, key=lambda fit: fit[1])[2] if exact else max(fits)[2]
-    return _SHORT.get(words[0]) if words and len(words[0]) == 1 and all(word.isdigit() for word in words[1:]) else None
+    return _SHORT.get(words[0]) if words and all(word.isdigit() for word in words[1:]) else None
 
 
 def parts_of(label: Label) -> list[Label]:
@@ -112,7 +111,7 @@ def parts_of(label: Label) -> list[Label]:
             values = tuple(token[0] for token in column)
             if len({*values}) > 1:
                 halves = _halves(Label(before, values, "part"))
-                if before and len(halves) == 1 and not {*values} <= _LETTERS:  # with the word ahead of it
+                if before and len(halves) == 1 and not {*values} <= LETTERS:  # with the word ahead of it
                     values = tuple(name[own[k - 1][1] : own[k][2]] for name, own in zip(names, tokens, strict=True))
                     halves = [Label(before, values, "part")]
                 found += halves
@@ -152,9 +151,9 @@ def together(*every: Ints) -> Ints:
     return codes([*zip(*(one.tolist() for one in every), strict=True)])
 
 
-def _varying(labels: Sequence[Label], *, lengths: bool) -> list[_Counted]:
+def varying(labels: Sequence[Label], *, lengths: bool) -> list[Counted]:
     """Labels, and parts of names, that differ and are there for all, without those that say the same again."""
-    seen: dict[bytes, _Counted] = {}
+    seen: dict[bytes, Counted] = {}
     names = (label for label in labels if label.sort in ("column", "head", "title") and len({*label.values}) > 1)
     for label in (*labels, *(part for name in names for part in parts_of(name))):
         own = codes(label.values)
@@ -185,12 +184,12 @@ def numbered_runs(values: Sequence[str]) -> Ints:
 
 def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
     """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
-    count, several, found = len(reference), bool(reference.max(initial=0) > 0), _varying(labels, lengths=True)
+    count, several, found = len(reference), bool(reference.max(initial=0) > 0), varying(labels, lengths=True)
     if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
         found = [(f[0], f[1], RUN if f[0].sort == "head" and _counting(f[0].values) else f[2]) for f in found]
     plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
     run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
-    line: list[_Counted] = []
+    line: list[Counted] = []
     for one in sorted((f for f in plain if f[2] == LINE), key=lambda f: (f[0].sort == "part", -f[1].max())):
         if not line or not fixes(together(*(f[1] for f in line)), one[1]):
             line.append(one)
@@ -227,7 +226,7 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     return names or [titled[-1] if titled else "1"] * count, numbers, used
 
 
-def _one_run(labels: Sequence[Label], runs: Sequence[_Counted], place: str) -> _Counted | None:
+def _one_run(labels: Sequence[Label], runs: Sequence[Counted], place: str) -> Counted | None:
     """The label that counts runs; an error where two do, each in its own way."""
     if unnamed := [label.words for label in labels if label.sort == "unnamed"]:
         raise NotReadError("no line is named", where=unnamed[0], fix="Complete the row")
@@ -243,128 +242,3 @@ def _one_run(labels: Sequence[Label], runs: Sequence[_Counted], place: str) -> _
 
 def _digits(label: Label) -> bool:
     return all(value.strip().isdigit() for value in label.values)
-
-
-def places(xyz: Floats) -> Ints:
-    """Number of the place of each point (n, 3): those within half a millimetre of the first there are one."""
-    found = np.full(len(xyz), -1, dtype=np.int64)
-    firsts = np.empty((0, 3))
-    for i, one in enumerate(xyz):
-        near = np.flatnonzero(np.abs(firsts - one).max(axis=1, initial=0) < _SAME_PLACE_MM)
-        found[i] = near[0] if len(near) else len(firsts)
-        firsts = firsts if len(near) else np.vstack([firsts, one])
-    return found
-
-
-_LAST = ("column", "part", "head", "title", "sheet", "block")
-
-
-def points_of_names(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]] | None:
-    """Measurement, point and repeat of each place; ``None`` where nothing says which belong together.
-
-    What differs at one place is a repeat. Of two others the one that changes more slowly counts measurements, unless words
-    say which of them does. Points that have one name each are of one measurement, unless their distances come again in turn.
-    """
-    count, place = len(xyz), places(xyz)
-    again = bool(place.max() + 1 < count)
-    found = _varying(labels, lengths=False)
-    if any({*f[0].values} <= _LETTERS for f in found):  # then P counts positions
-        letters = [re.match(r"([pm])(?![^\W\d_])", f"{f[0].words}{f[0].values[0]}".casefold()) for f in found]
-        known = {m[1] for m in letters if m}
-        of = {"p": LINE, **({"m": RUN} if len(known) == 2 else {})}
-        found = [(*f[:2], of.get(m[1], f[2]) if m else f[2]) for f, m in zip(found, letters, strict=True)]
-    each = [f for f in found if f[1].max() + 1 == count]
-    found = [f for f in found if f[1].max() + 1 < count]
-    run = _run_of(found, place) if again or any(f[2] == RUN for f in found) else None
-    repeat = None if run is None else numbered_runs(run[0].values)
-    if again and run is None and not any(f[2] == LINE and not fixes(place, f[1]) for f in found):
-        repeat = in_turn(place)
-    rest = [f for f in found if run is None or (f[0] is not run[0] and not fixes(run[1], f[1]))]
-    order = sorted(rest, key=lambda f: (_LAST.index(f[0].sort), np.count_nonzero(np.diff(f[1]))))
-    lines, faces, free = ([f for f in order if f[2] == word] for word in (LINE, POINT, None))
-    slow = sorted(free, key=lambda f: (f[0].sort == "block", np.count_nonzero(np.diff(f[1])), f[0].sort == "part"))
-    pairs = [(one, other) for one in (*lines, *([] if lines else [*slow, None])) for other in (*faces, *slow[::-1])]
-    more = [] if repeat is None else [repeat]
-    fitting = [pair for pair in pairs if _tells(*pair, more, count)]
-    turned = [(other, one) for one, other in fitting if one is not None]
-    if fitting:
-        rigid = ((one, other) for one, other in (*fitting, *turned) if one and _rigid(one, other, repeat, xyz))
-        return _columns(*next(rigid, fitting[0]), repeat, count)
-    if lines or again or not each:
-        return None
-    size = alike_in_turn(xyz) or (count if _on_a_ball(xyz) else None)
-    if size is not None:
-        rows = np.arange(count)
-        return {"measurement": [f"{k // size + 1}" for k in rows], "point": [f"{k % size + 1}" for k in rows]}
-    return next((_columns(None, f, None, count) for f in each if f[2] == POINT), None)
-
-
-def _tells(measurement: _Counted | None, point: _Counted, more: Sequence[Ints], count: int) -> bool:
-    """Whether two labels, and what counts repeats, tell all points apart."""
-    if measurement is None:
-        return point[2] == POINT and bool(together(point[1], *more).max() + 1 == count)
-    apart = point is not measurement and not fixes(measurement[1], point[1])
-    return apart and bool(together(measurement[1], point[1], *more).max() + 1 == count)
-
-
-def _rigid(measurement: _Counted, point: _Counted, repeat: Ints | None, xyz: Floats) -> bool:
-    """Whether the points have the same distances from each other in every measurement, as those of one artefact."""
-    first = np.ones(len(xyz), dtype=bool) if repeat is None else repeat == repeat[0]
-    shape = measurement[1].max() + 1, point[1].max() + 1
-    if first.sum() != shape[0] * shape[1] or min(shape) < 2:
-        return False
-    own = np.full((*shape, 3), np.nan)
-    own[measurement[1][first], point[1][first]] = xyz[first]
-    return bool(np.ptp(np.linalg.norm(own[:, :, None] - own[:, None, :], axis=3), axis=0).max() < _RIGID_MM)
-
-
-def _run_of(found: Sequence[_Counted], place: Ints) -> _Counted | None:
-    """The label that counts repeats: by its words, else the one by which all points at one place differ."""
-
-    def called(label: _Counted) -> bool:
-        return hint(label[0].words, lengths=True) == RUN
-
-    def differ(*labels: _Counted) -> bool:
-        return bool(together(place, *(f[1] for f in labels)).max() + 1 == len(place))
-
-    apart = [f for f in found if not fixes(place, f[1])]
-    by_words = [f for f in found if f[2] == RUN]
-    fixed = any(f[2] == LINE and fixes(place, f[1]) for f in found)  # then another word for measurements counts repeats
-    by_place = [f for f in apart if (f[2] is None or (f[2] == LINE and (fixed or called(f)))) and differ(f)]
-    if any(f[2] == LINE == hint(f[0].words, lengths=True) and differ(f) for f in apart):
-        # an artefact turned about its middle comes to the same places
-        by_place = [f for f in by_place if f[2] is not None]
-    choices = [f for f in by_words if f in apart] or by_words or [f for f in by_place if f[2] is None] or by_place
-    if not choices and differ(*apart):
-        fast = max(apart, key=lambda f: np.count_nonzero(np.diff(f[1])))  # the others are set-ups, read again in each
-        choices = [fast] if fast[2] == LINE and called(fast) else []
-    return min(choices, key=lambda f: (f[1].max(), _LAST.index(f[0].sort)), default=None)
-
-
-def _columns(measurement: _Counted | None, point: _Counted, repeat: Ints | None, count: int) -> dict[str, list[str]]:
-    measurements = ["1"] * count if measurement is None else [*measurement[0].values]
-    columns = {"measurement": measurements, "point": [*point[0].values]}
-    return columns if repeat is None else {**columns, "repeat": [f"{n}" for n in repeat]}
-
-
-def alike_in_turn(xyz: Floats) -> int | None:
-    """How many points in turn are one measurement of a rigid artefact that was turned, by the distances that come again."""
-    for size in (size for size in range(2, len(xyz) // 3 + 1) if len(xyz) % size == 0):
-        own = xyz.reshape(-1, size, 3)
-        distances = np.linalg.norm(own[:, :, None] - own[:, None, :], axis=3)
-        along = (own[:, -1] - own[:, 0]) / np.maximum(distances[:, 0, -1:], 1e-9)
-        rigid = np.ptp(distances, axis=0).max() < _RIGID_MM and distances[:, 0, -1].min() > 1
-        if rigid and np.abs(along @ along[0]).min() < 0.99:
-            return size
-    return None
-
-
-def _on_a_ball(xyz: Floats) -> bool:
-    """Whether places (n, 3) are points probed on one ball: more than enough of them, all round, within a few micrometres."""
-    about = xyz - xyz.mean(axis=0)
-    if len(xyz) < _PROBED or np.linalg.svd(about, compute_uv=False)[2] < _ROUND * np.linalg.norm(about):
-        return False
-    sides = np.column_stack([2 * about, np.ones(len(xyz))])
-    centre = np.linalg.lstsq(sides, np.sum(about**2, axis=1), rcond=None)[0][:3]
-    distance = np.linalg.norm(about - centre, axis=1)
-    return bool(distance.max() < _LARGEST_BALL_MM and np.ptp(distance) < _FORM_MM)

@@ -319,7 +319,7 @@ _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
 # Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
     *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc", "reports.Calypso", "reports.Qdas"),
-    *("reports.Dmis", "pcdmis.PcDmis", "pcdmis.FeatureReport", "reports.Ipp", "lines.Rtl"),
+    *("reports.Dmis", "pcdmis.PcDmis", "reports.Ipp", "lines.Rtl"),
 )
 
 
@@ -366,10 +366,12 @@ def stacked(sheet: Sheet) -> Sheet:
 
 
 def transposed(sheet: Sheet) -> Sheet | None:
-    """The widest part of a sheet with its rows as columns."""
+    """The widest part of a sheet with its rows as columns, each below the text that stands alone above it."""
     wide = [i for i, row in enumerate(sheet.rows) if len(row) > 3]
     width = max((len(sheet.rows[i]) for i in wide), default=0)
     if not wide or len(wide) > 300 or width > 300:
         return None
+    above = [next((row[0] for row in sheet.rows[i - 1 : i] if len(row) == 1), "") for i in wide]
     columns = [[*row] for row in zip_longest(*(sheet.rows[i] for i in wide), fillvalue="")]
-    return replace(sheet, rows=columns, lines=[sheet.lines[wide[0]]] * width, spreadsheet=False)
+    columns = [above, *columns] if any(above[1:]) else columns
+    return replace(sheet, rows=columns, lines=[sheet.lines[wide[0]]] * len(columns), spreadsheet=False)

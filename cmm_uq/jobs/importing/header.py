@@ -275,7 +275,8 @@ def names_axes(row: Sequence[Cell]) -> bool:
     texts = [cell for cell in row if isinstance(cell, str) and cell]
     if len(texts) < 3 or len(texts) < sum(cell != "" for cell in row) or any(map(is_number, texts)):
         return False
-    return {*COORDINATES} <= {understood(text).column for text in texts}
+    letters = [{*plain_words(text)} & {*AXES} for text in texts]
+    return {*COORDINATES} <= {understood(text).column for text in texts} or all({axis} in letters for axis in AXES)
 
 
 def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> CmmUqError:
@@ -307,6 +308,7 @@ def no_header(sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Seq
     return NotReadError(f"no column is {missing} among {listed}{hint}", where=place, fix=fix)
 
 
+_FEW = 3  # rows, which say nothing of others
 _TOLD = 40  # characters of a row that is left out
 SUMMARY, REMARK = "a summary", "a remark"
 
@@ -322,6 +324,13 @@ def is_summary(row: Sequence[Cell]) -> bool:
         return True
     label = text_of(labels[0]) if labels else ""
     return label.endswith((")", "]")) and not re.search(r"\d", label) and without_unit(label)[1] is not None
+
+
+def named_alike(rows: Sequence[Sequence[Cell]], of: Sequence[int]) -> int:
+    """How many rows come ahead of those, at the end, whose names have no number as all others have: results below points."""
+    numbered = [any(map(str.isdigit, text_of(next((cell for cell in rows[i] if cell != ""), "")))) for i in of]
+    count = sum(numbered)
+    return count if count > _FEW and all(numbered[:count]) else len(of)
 
 
 def shown(sheet: Sheet, i: int, why: str) -> str:

@@ -10,7 +10,6 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.header import printed_words
-from cmm_uq.jobs.importing.numbering import split_names
 from cmm_uq.jobs.importing.reports import AXES, WITH_DIRECTION, ReportedPlace, TextReport, facts_of
 
 _WORDS = {name: "|".join(map(re.escape, words)) for name, words in printed_words("report").items()}
@@ -27,7 +26,6 @@ _BELOW = {
 }
 _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+(?:(?:RFS|MMC|LMC)\s+)?[-+\d.]", re.IGNORECASE)
 _CONDITION = re.compile(r"^\s*[A-Z]+\s+(RFS|MMC|LMC)\s", re.IGNORECASE)
-_UNIT_LINE = re.compile(rf"^\s*(?:{_WORDS['units']})\s*[:=]\s*(\w+)", re.IGNORECASE)
 _NUMBER = re.compile(r"(?<!\S)(?:[-+]?\d*[.,]?\d+|[-+]?\d+[^\s\d.,]{1,3}\d+'\d+(?:[.,]\d+)?\")(?!\S)")
 
 
@@ -72,57 +70,6 @@ class PcDmis(TextReport):
         unit = places[0].unit if places else found[0].unit or None
         sheets = sheets_of(rows, headings, unit=unit, facts=facts)
         return sheets if places else [replace(one, rows=[headings, *one.rows[1:]]) for one in sheets]
-
-
-_TITLE = re.compile(rf"^[ \t]*(?P<sort>{_WORDS['features']})[ \t]*[:=][ \t]*(?P<of>\S+)", re.IGNORECASE | re.MULTILINE)
-_COORDINATE = re.compile(r"^[ \t]*(?P<axis>[XYZ])(?:[- ]?[^\W\d]+)?[ \t]+[-+\d]", re.IGNORECASE | re.MULTILINE)
-_SECTION = re.compile(r"^\s*(?:\*+|=+|#+)\s*(.*\w)\s*(?:\*+|=+|#+)\s*$")
-
-
-class FeatureReport(TextReport):
-    """A report with a title for each feature, as ``SPHERE : S1``, below it a heading and lines X, Y and Z with figures."""
-
-    name = "features"
-    title = say("text report of features")
-    shows = (_TITLE, _COORDINATE)
-
-    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
-        places, unit = _features(lines, where)
-        whole = [place for place in places if len(place.xyz) == len(AXES)]
-        if odd := [place for place in places if 0 < len(place.xyz) < len(AXES)] or places[: not whole]:
-            what = f"{odd[0].feature!r} has not X, Y and Z"
-            fix = "Report all three of every feature; if it is the last one, the file was cut off"
-            raise CmmUqError(what, where=f"{where} line {odd[0].line}", fix=fix)
-        if len({place.feature for place in whole}) < len(whole):  # named again in each section
-            whole = [replace(place, feature=f"{place.dimension} {place.feature}") for place in whole]
-        facts = facts_of(encoding, "features_not_used", say("Features that are no place"), len(places) - len(whole))
-        return sheets_of([place.row for place in whole], WITH_DIRECTION[:4], unit=unit, facts=facts)
-
-
-def _features(lines: Sequence[str], where: str) -> tuple[list[ReportedPlace], str | None]:
-    """Features with the coordinates that stand below their titles, and the unit that a line says."""
-    places: list[ReportedPlace] = []
-    section, ends, unit = "", dict[str, int](), None
-    for line, content in enumerate(lines, 1):
-        words = _ends(content)
-        if title := _TITLE.match(content):
-            places.append(ReportedPlace(title["of"], line, "", section, title["sort"]))
-        elif found := _SECTION.match(content):
-            section = found[1]
-        elif {"MEAS", "NOMINAL"} <= words.keys() and not any(map(str.isdigit, content)):
-            ends = words
-        elif places and (row := _COORDINATE.match(content)):
-            place, axis = f"{where} line {line}", row["axis"].upper()
-            if axis in places[-1].xyz:
-                what = f"{axis} of {places[-1].feature!r} is there twice"
-                raise CmmUqError(what, where=place, fix="Export each run as a file of its own")
-            places[-1].xyz[axis] = _below(content, ends, place)["MEAS"]
-        elif of_unit := _UNIT_LINE.match(content):
-            if unit not in (None, of_unit[1]):
-                what = f"is in {unit} before this line, and in {of_unit[1]} after it"
-                raise CmmUqError(what, where=f"{where} line {line}", fix="Export it in one unit")
-            unit = of_unit[1]
-    return places, unit
 
 
 @dataclass(frozen=True)
@@ -177,7 +124,8 @@ def dimensions(lines: Sequence[str], where: str) -> list[Dimension]:
 def _lengths(found: Sequence[Dimension]) -> list[Row]:
     """Distances whose names number their line and their length, as ``LINE1_L2_RUN3``, with what is nominal and measured."""
     every = [one for one in found if "M" in one.rows]
-    if len(every) < 2 or split_names([one.name for one in every]) is None:
+    forms = {re.sub(r"\d+", "0", one.name) for one in every}
+    if len(every) < 2 or len(forms) > 1 or forms.pop().count("0") not in (2, 3):
         return []
     below = [_below(*one.rows["M"]) for one in every]
     return [

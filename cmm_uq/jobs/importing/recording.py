@@ -191,11 +191,11 @@ def _imported(
     content: bytes, where: str, keys: ImportKeys, wanted: Sequence[Sequence[str]], reach_mm: float | None
 ) -> ImportedTable:
     if len(content) > TABLE_BYTES.most:
-        problem = f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file"
-        raise CmmUqError(problem, where=where, fix="Split it")
+        large = f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file"
+        raise CmmUqError(large, where=where, fix="Split it")
     form, file = format_of(content, where), PurePath(where).name
     recognised = Recognition(file, form.name, form.title, (), {}, 0)
-    problem_: CmmUqError | None = None
+    problem: NotReadError | None = None
     try:
         sheets = _sheets_of(form, content, where, keys)
         sheet, header = _chosen(sheets, keys, where, wanted)
@@ -206,12 +206,12 @@ def _imported(
         head = tuple(head_of(sheet.rows[header.row])) if header.row < header.first else ()
         return _points(sheet, header, keys, where, reach_mm, replace(recognised, head=head), points=wanted is POINTS)
     except NotReadError as error:
-        problem_ = error
+        problem = error
     if wanted is POINTS and {*keys.columns} <= {*COLUMNS, *OPTIONAL, *WHOLE}:
         understood = understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines)
         if understood is not None:
             return _understood(understood, keys, where, reach_mm, recognised)
-    raise problem_ or no_header(sheets, keys, where, wanted)
+    raise problem or no_header(sheets, keys, where, wanted)
 
 
 def _understood(
@@ -247,7 +247,7 @@ def _alternatives(form: Format, content: bytes, where: str, keys: ImportKeys) ->
     if form.name != "text":
         with suppress(CmmUqError):
             yield [_with_unit(sheet) for sheet in form.read(content, where, keys) if keys.sheet in (None, sheet.name)]
-    if form.name in ("text", "calypso", "pc-dmis", "features"):
+    if form.name in ("text", "calypso", "pc-dmis"):
         for sheets in alternatives(content, where, keys):
             yield [_with_unit(replace(sheet, decimal=keys.decimal)) for sheet in sheets]
 
@@ -312,8 +312,11 @@ def _chosen(
         raise no_header(sheets, keys, where, wanted)
     if len(tables) > 1:
         listed = ", ".join(repr(sheet.name) for sheet, _ in tables)
-        raise NotReadError(f"holds {len(tables)} tables of points: {listed}", where=where,
-                         fix=f'Say which: sheet = "{tables[0][0].name}"')  # fmt: skip
+        raise (CmmUqError if tables[0][0].listed else NotReadError)(
+            f"holds {len(tables)} tables of points: {listed}",
+            where=where,
+            fix=f'Say which: sheet = "{tables[0][0].name}"',
+        )
     return tables[0]
 
 

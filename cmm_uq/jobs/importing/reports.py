@@ -321,23 +321,29 @@ def _probed(tag: str, terms: dict[str, str], line: int, where: str) -> Row:
     return "", [tag, *(terms[axis].strip() for axis in AXES), *direction], line
 
 
-_PAIR = re.compile(r"([^\W\d]\w*)\s{0,9}=\s{0,9}([^\s=]{1,40})(?=\s|$)")  # as ``target= 50.0``
+# as ``target= 50.0``, or an axis ahead of its figure
+_PAIR = re.compile(
+    r"(?<!\w)([^\W\d]\w*)\s{0,9}=\s{0,9}([^\s=|]{1,40})|(?<![\w.])([XYZ])\s{0,9}:?\s{0,9}([-+]?\d+[.,]\d+)(?![\w.])"
+)
 _LEAST = 6  # lines of one form
 
 
-def in_pairs(text: str) -> list[list[str]] | None:
-    """Cells of every line of a log that names each of its figures (``run=1 target= 50.0``); ``None`` of another text.
+def in_pairs(text: str) -> list[tuple[int, list[str]]] | None:
+    """Cells of every line of a log that names its figures (``run=1 target= 50.0``), by line; ``None`` of another text.
 
-    The names stand in the line ahead of the first, which must be another.
+    The names stand ahead of the first; what stands ahead of all pairs of a line is a cell too.
     """
     lines = [line.strip() for line in text.splitlines()]
-    pairs = [_PAIR.findall(line) if line.count("=") > 1 else [] for line in lines]
+    found = [[*_PAIR.finditer(line)] if len(line) < LINE.most else [] for line in lines]
+    pairs = [[(m[1] or m[3], m[2] or m[4]) for m in own] if len(own) > 1 else [] for own in found]
     forms = Counter(tuple(name for name, _ in own) for own in pairs if own)
     form, count = max(forms.items(), key=lambda one: one[1], default=((), 0))
     if count < _LEAST or 2 * count < sum(map(bool, lines)):
         return None
-    alike = [tuple(name for name, _ in own) == form for own in pairs]
-    each = zip(lines, pairs, alike, strict=True)
-    rows = [[value for _, value in own] if same else [line] for line, own, same in each]
-    first = alike.index(True)
-    return [*rows[: first - 1], [*form], *rows[first:]] if first else None
+    rows: list[tuple[int, list[str]]] = []
+    for n, (line, own, at) in enumerate(zip(lines, pairs, found, strict=True), 1):
+        same = tuple(name for name, _ in own) == form
+        if same and not any(len(cells) > 1 for _, cells in rows):
+            rows.append((n, ["", *form]))
+        rows.append((n, [line[: at[0].start()].strip(" |;,\t"), *(value for _, value in own)] if same else [line]))
+    return rows

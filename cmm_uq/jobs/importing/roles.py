@@ -147,6 +147,9 @@ class SheetReading:
     blank: list[tuple[int, int]] = field(default_factory=list)  # row and column of measured values that are not there
     bare: Sequence[int] = ()  # numbers of columns that no head names
     others: Sequence[int] = ()  # rows that belong to it
+    beside_lengths: bool = (
+        False  # whether they are places that stand beside something else, as where a length was measured
+    )
     beside: list[Labels] = field(default_factory=list)  # of each row
     further: dict[str, Floats] = field(default_factory=dict)
 

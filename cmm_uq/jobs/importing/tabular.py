@@ -37,6 +37,10 @@ _TITLES: dict[str, Text] = {
 }  # fmt: skip
 _TOKEN, _PHRASE = re.compile(r"\S+"), re.compile(r"\S+(?: \S+)*")
 _POINT = re.compile("[.,]")
+_WIDE = re.compile(
+    "[\u1100-\u115f\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe4f\uff00-\uff60\uffe0-\uffe6]"
+)  # as two
+_HELD = "\0"  # beside a character that is printed as wide as two
 _NUMBER = re.compile(r"[±+-]?\d[\d.,]*%?|[±+-]?[.,]\d+")
 _LINES = re.compile(r"\s*[\r\n]\s*")  # of a heading in a cell
 _KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
@@ -102,7 +106,7 @@ def alternatives(content: bytes, where: str, keys: ImportKeys) -> Iterator[list[
         if candidate in text:
             yield [Sheet("", *_rows(text, candidate, where), facts=_facts(encoding, candidate))]
     if (rows := in_pairs(text)) is not None and keys.delimiter is None:
-        yield [Sheet("", *_filled(enumerate(rows, 1), f"{where} line"), facts=_facts(encoding, _BLANK)[:1])]
+        yield [Sheet("", *_filled(rows, f"{where} line"), facts=_facts(encoding, _BLANK)[:1])]
 
 
 def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:
@@ -112,7 +116,7 @@ def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:
 
 def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
     """Cells of lines by where they stand: columns are where figures stand below each other, heads go to the nearest."""
-    lines = [line.expandtabs() for line in lines]
+    lines = [_WIDE.sub(rf"\g<0>{_HELD}", line.expandtabs()) for line in lines]
     tokens = [[(m.start(), m.end(), m[0]) for m in _TOKEN.finditer(line)] for line in lines]
     counted = [_is_row([text for _, _, text in own], line) for own, line in zip(tokens, lines, strict=True)]
     spans: list[tuple[int, int]] = []  # where tokens stand, those that overlap together
@@ -124,17 +128,17 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
     for own, is_row, line in zip(tokens, counted, lines, strict=True):
         phrases = own if is_row else [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line)]
         if not is_row and len(phrases) < 2 and (not phrases or phrases[0][0] < 8):
-            yield [line.strip()]
+            yield [line.strip().replace(_HELD, "")]
             continue
         if not is_row and len(phrases) == len(spans):
-            yield [text for _, _, text in phrases]
+            yield [text.replace(_HELD, "") for _, _, text in phrases]
             continue
         cells = [""] * max(1, len(spans))
         for start, end, text in phrases:
             over = (k for k, (a, b) in enumerate(spans) if a < end and start < b)
             nearest = min(range(len(spans)), key=lambda k: abs(spans[k][1] - end), default=0)
             k = next(over, nearest)
-            cells[k] = f"{cells[k]} {text}".strip() if is_row or not cells[k] else f"{cells[k]} {text}"
+            cells[k] = f"{cells[k]} {text.replace(_HELD, '')}".strip()
         yield cells
 
 

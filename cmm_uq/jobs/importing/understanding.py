@@ -21,15 +21,17 @@ from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
-from cmm_uq.jobs.importing.coordinates import points_in, rows_of_axes, runs_in
+from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes, runs_in
 from cmm_uq.jobs.importing.factors import codes, hint, lines_and_runs
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
+from cmm_uq.jobs.importing.grouping import places
 from cmm_uq.jobs.importing.header import Header, is_summary
 from cmm_uq.jobs.importing.length_columns import lengths_in
 from cmm_uq.jobs.importing.lines import MeasuredLengths, axis_in
 from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, rows_left_out, said_by
 
+_COMPARED = 5000  # points of sheets
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+")
 Found = tuple[SheetReading, CutSheet]
@@ -73,13 +75,14 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
                 own = own or _of_sheet(one, keys, where, turned=one is not sheet)
             except NotReadError as error:
                 problem = problem or error
-        found += own
+        found += [one for one in own if problem is None or one[0].kind != "points" or one[1].sheet is sheet]
     chosen = _chosen(found)
     if not chosen and problem is not None:
         raise problem
     of = list(dict.fromkeys(grid.sheet.name for _, grid in chosen))
     # names of sheets with points must count measurements or repeats, and be no tables of different things
     counted = len({re.sub(r"\d+", "0", name) for name in of}) == 1 or all(hint(name, lengths=False) for name in of)
+    counted = counted or (not sheets[0].listed and _elsewhere(chosen))
     if not chosen or (chosen[0][0].kind == "points" and not counted):
         return None
     _refuse_unmatched([grid for _, grid in chosen], keys, where)
@@ -88,12 +91,32 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
         _refuse_same_lines(chosen, where)
         elsewhere = _tabled_places(upright, of)
     left_out: list[str] = []
+    _take_results(found, chosen)
     for grid in {id(own): own for _, own in chosen}.values():
         if (told := rows_left_out([reading for reading, own in chosen if own is grid], grid)) is None:
             return None
         left_out += told
     _label(chosen, elsewhere)
     return Understanding(joined([reading for reading, _ in chosen]), sheets, left_out, chosen[0][1])
+
+
+def _take_results(found: Sequence[Found], chosen: Sequence[Found]) -> None:
+    """A few points beside many are results of those, as the centre of a ball, and belong to them."""
+    own = {id(reading) for reading, _ in chosen}
+    for reading, grid in found if chosen[0][0].kind == "points" else ():
+        beside = next((one for one, other in chosen if other is grid), None)
+        if beside is not None and id(reading) not in own:
+            beside.others = [*beside.others, *reading.rows, *reading.others]
+
+
+def _elsewhere(chosen: Sequence[Found]) -> bool:
+    """Whether the points of each sheet lie elsewhere than those of the others."""
+    sheets = codes([grid.sheet.name for reading, grid in chosen for _ in reading.figures])
+    xyz = np.array([own for reading, _ in chosen for own in reading.figures])
+    if len(xyz) > _COMPARED or chosen[0][0].kind != "points":
+        return False
+    at = places(xyz)
+    return len({*zip(sheets.tolist(), at.tolist(), strict=True)}) == int(at.max()) + 1
 
 
 def _label(chosen: Sequence[Found], elsewhere: Mapping[str, str]) -> None:
@@ -156,24 +179,36 @@ def _tabled_places(sheets: Sequence[Sheet], others: Collection[str]) -> dict[str
 
 def _of_sheet(sheet: Sheet, keys: Mapping[str, Sources], where: str, *, turned: bool) -> list[Found]:
     grid, found = CutSheet(sheet, keys, where), []
+    problem: NotReadError | None = None
     for blocks, rows in each(grid):
         usable = [
             row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
         ]
         own = _layout(grid, usable) if usable else []
         readings: list[SheetReading] = []
-        places = (points_in, rows_of_axes) if {*keys} <= {*WHOLE} else ()
+        places = (*(() if turned else (rows_of_axes,)), points_in) if {*keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
         for read in (lengths + places if {*own} <= {*grid.places_of} else places + lengths) if own else ():
+            try:
+                reading = read(grid, blocks, own)
+            except EitherError as error:
+                problem, reading = problem or error, None
             # of a turned sheet words must say which lengths, or targets, those that were measured are of
-            if (reading := read(grid, blocks, own)) is not None and (reading.called or not turned):
+            if reading is not None and (
+                reading.called or not turned or (reading.kind == "points" and not reading.bare)
+            ):
                 readings.append(reading)
-                if 2 * len({*reading.rows, *reading.others}) > len(own):
-                    break  # else they are places of lines, or a few rows that were taken for others
+                # else they are places of lines or of features, or a few rows that were taken for others
+                if 2 * len({*reading.rows, *reading.others}) > len(own) and not reading.beside_lengths:
+                    break
         if readings:
+            confirmed = [one for one in readings if one.kind == "lengths" and one.called and one.checked]
+            readings = [one for one in readings if not (one.beside_lengths and confirmed)]
             reading = max(readings, key=lambda one: len({*one.rows, *one.others}))
             reading.lines = [sheet.lines[row] for row in reading.rows]
             found.append((reading, grid))
+    if problem is not None and not found:
+        raise problem
     return found
 
 
@@ -267,16 +302,16 @@ class Understanding:
     def points(
         self, keys: ImportKeys, where: str, reach_mm: float | None
     ) -> tuple[dict[str, Floats], tuple[Fact, ...]]:
-        if self.reading.bare and keys.points_per_measurement is None:
-            known = keys.unit or self.sheets[0].unit or unit_elsewhere(self.sheets, small=False)
-            what = f"no line names the columns: {', '.join(map(str, self.reading.bare))} may be x, y and z"
-            unit_ = "" if known else ', and unit = "mm" or "inch"'
-            fix = f'If they are, say how many rows in turn are one measurement, points_per_measurement = N (or "all"){unit_}'
-            raise NotReadError(what, where=where, fix=fix)
-        unit, of_unit = self.unit(keys, where, reach_mm)
-        xyz = np.column_stack([formats.converted(own, unit, "x_mm") for own in np.array(self.reading.figures).T])
-        labels = self.reading.every_label
-        numbers, facts = numbered_points(labels, xyz, keys, where)
+        try:
+            unit, of_unit = self.unit(keys, where, reach_mm)
+            xyz = np.column_stack([formats.converted(own, unit, "x_mm") for own in np.array(self.reading.figures).T])
+            labels = self.reading.every_label
+            numbers, facts = numbered_points(labels, xyz, keys, where)
+        except NotReadError as error:
+            if not self.reading.bare:
+                raise
+            bare = f"no line names the columns: {', '.join(map(str, self.reading.bare))} may be x, y and z"
+            raise NotReadError(f"{bare}; {error.problem}", where=where, fix=f"If they are: {error.fix}") from None
         further = {name: np.array(own) for name, own in self.reading.covariates.items()}
         used = [label.words.strip() for label in labels if len({*label.values}) > 1 and label.sort != "block"]
         columns = {**numbers, **dict(zip(COORDINATES, xyz.T, strict=True)), **further}

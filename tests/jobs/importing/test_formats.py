@@ -89,7 +89,7 @@ def test_measured_points_of_qif_come_by_their_sets() -> None:
     text = text.replace("</QIFDocument>", sets)
     found = read(text, sheet="measured points")
     assert xyz(found) == [[1, 2, 3], [4, 5, 6]]
-    assert found.columns["measurement"].tolist() == [7, 7]
+    assert found.columns["measurement"].tolist() == [1, 1]
     with pytest.raises(CmmUqError, match="MeasuredPointSet id 7: has 5 numbers where 2 points have three each"):
         read(text.replace("4 5 6", "4 5"), sheet="measured points")
 

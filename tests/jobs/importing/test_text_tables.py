@@ -243,19 +243,27 @@ def test_numbers_of_measurement_and_point_come_from_names_that_have_two() -> Non
 
 
 @pytest.mark.parametrize(
-    ("name", "measurement", "point", "repeat"),
+    "name",
     [
-        ("Bar 3 ball 2", 3, 2, None), ("Ball2_Pos3", 3, 2, None), ("KUGEL 2 / MESSUNG 3", 3, 2, None), ("3.2", 3, 2, None),
-        ("M3_P2_R4", 3, 2, 4), ("Run 4, bar 3, ball 2", 3, 2, 4), ("Sphere2 (position 3)", 3, 2, None), ("B2-3", 3, 2, None),
+        "Bar {m} ball {p}", "Ball{p}_Pos{m}", "KUGEL {p} / MESSUNG {m}", "{m}.{p}", "Sphere{p} (position {m})", "B{p}-{m}",
+        "M{m}_P{p}_R{r}", "Run {r}, bar {m}, ball {p}",
     ],
 )  # fmt: skip
-def test_the_words_of_a_name_say_what_its_numbers_are(
-    name: str, measurement: int, point: int, repeat: int | None
-) -> None:
-    found = read(f'Name;X [mm];Y [mm];Z [mm]\n"{name}";1;2;3\n')
-    assert (found.columns["measurement"][0], found.columns["point"][0]) == (measurement, point)
-    assert found.columns.get("repeat", [None])[0] == repeat
-    assert f"measurement {measurement}, point {point}" in found.recognised.data["numbering"]
+def test_the_parts_of_a_name_say_measurement_point_and_repeat(name: str) -> None:
+    """A bar of 400 mm in three directions, read twice where names have a third number."""
+    ends = {3: [(1, 2, 3), (401, 2, 3)], 4: [(1, 2, 33), (1, 402, 33)], 5: [(1, 2, 63), (241, 2, 383)]}
+    every = [(m, p, r) for m in ends for r in ((1, 2) if "{r}" in name else (1,)) for p in (1, 2)]
+    rows = (";".join(map(str, (f'"{name.format(m=m, p=p, r=r)}"', *ends[m][p - 1]))) for m, p, r in every)
+    found = read("Name;X [mm];Y [mm];Z [mm]\n" + "\n".join(rows) + "\n")
+    columns = [found.columns.get(column, np.ones(len(every))) for column in ("measurement", "point", "repeat")]
+    assert [*zip(*columns, strict=True)] == every
+
+
+def test_names_of_which_nothing_says_what_they_number_are_asked_about() -> None:
+    """Rows of a plate, or bars side by side."""
+    rows = "".join(f"{m}.{p};{100 * p};{170 * m};5\n" for m in (1, 2, 3) for p in (1, 2, 3, 4))
+    with pytest.raises(CmmUqError, match="nothing says which points belong to one measurement"):
+        read(f"Name;X [mm];Y [mm];Z [mm]\n{rows}")
 
 
 def test_names_whose_numbers_are_both_of_a_point_say_no_measurement() -> None:
@@ -415,9 +423,9 @@ FEATURE = "SPHERE : S{0}\n     Nominal    Actual\nX    1.0000    1.0010\nY    2.
 
 
 @pytest.mark.parametrize(("text", "told"), [
-    (FEATURE.format(1) + "X    4.0000    4.0010\n", "line 6: X of 'S1' is there twice"),
-    ("Units: mm\n" + FEATURE.format(1) + "Units: inch\n" + FEATURE.format(2), "line 7: is in mm before this line"),
-    (FEATURE.format(1).replace("Z    3.0000    3.0010\n", ""), "'S1' has not X, Y and Z"),
+    (FEATURE.format(1) + "X    4.0000    4.0010\n", "no column is y_mm"),
+    ("Units: mm\n" + FEATURE.format(1) + "Units: inch\n" + FEATURE.format(2), "no column is y_mm"),
+    (FEATURE.format(1).replace("Z    3.0000    3.0010\n", ""), "nothing says"),
 ])  # fmt: skip
 def test_a_report_of_features_drops_nothing(text: str, told: str) -> None:
     with pytest.raises(CmmUqError, match=told):
@@ -432,9 +440,9 @@ def test_a_list_of_points_without_a_head_is_asked_about_once() -> None:
         ("P4", 9.5, 19.25, 300.5),
     ]
     content = "\n".join(";".join(map(str, row)) for row in rows).encode()
-    with pytest.raises(CmmUqError, match=r"2, 3, 4 may be x, y and z.*points_per_measurement = N.*unit = "):
+    with pytest.raises(CmmUqError, match=r"2, 3, 4 may be x, y and z; nothing says the unit.*If they are: Say unit = "):
         imported(content, "list.txt", ImportKeys())
-    found = imported(content, "list.txt", ImportKeys(points_per_measurement="all", unit="mm"))
+    found = imported(content, "list.txt", ImportKeys(unit="mm"))
     np.testing.assert_array_equal(
         np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"]), [row[1:] for row in rows]
     )

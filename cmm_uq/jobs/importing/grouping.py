@@ -1,0 +1,251 @@
+"""Which places are one measurement of an artefact, which point of it each is, and what was measured again.
+
+Figures say it first: an artefact has the same distances between its points in every measurement, and what comes to the same
+place again is a repeat. Of the labels beside places, and the parts of their names, the one is taken by which this holds; words
+break ties. Where nothing stands beside them, the order in which distances come again says it. Of two that fit alike, neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.jobs.importing.factors import (
+    LETTERS,
+    LINE,
+    POINT,
+    RUN,
+    Counted,
+    Label,
+    counted,
+    fixes,
+    in_turn,
+    numbered_runs,
+    varying,
+)
+
+_SAME_PLACE_MM = 0.5
+_RIGID_MM = 0.1
+_EVEN_MM = 0.2  # to which the points of a plate are evenly spaced
+_COMPARED = 5000  # points of which the places are compared
+_PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
+_TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED = 6.0, 5.0, 4.0, 3.0, 2.0  # what speaks for a way, the strongest first
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """A way to tell places apart, and how much speaks for it."""
+
+    rank: float
+    of: Counted | None  # label that tells measurements apart; ``None`` where there is one
+    measurement: Ints
+    at: Ints  # a number for each place of each measurement
+    point: Counted | None  # label of points; ``None`` where they count in turn
+
+
+def places(xyz: Floats) -> Ints:
+    """Number of the place of each point (n, 3): those within half a millimetre of the first there are one."""
+    found = np.full(len(xyz), -1, dtype=np.int64)
+    firsts, count = np.empty_like(xyz), 0
+    for i, one in enumerate(xyz):
+        near = np.flatnonzero(np.abs(firsts[:count] - one).max(axis=1, initial=0) < _SAME_PLACE_MM)
+        found[i] = near[0] if len(near) else count
+        if not len(near):
+            firsts[count] = one
+            count += 1
+    return found
+
+
+def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]] | None:
+    """Measurement, point and repeat of each of the places (n, 3), mm; ``None`` where nothing says which belong together."""
+    place = places(xyz) if len(xyz) <= _COMPARED else np.arange(len(xyz))
+    found = varying(labels, lengths=False)
+    ways = [*filter(None, (_grouped(of, found, place, xyz) for of in _labels(found)))]
+    plate = len(xyz) <= _COMPARED and _on_a_plate(xyz[np.unique(place, return_index=True)[1]])
+    named = any(way.of is None and way.rank and way.at.max() + 1 < len(xyz) for way in ways)  # names that come again
+    if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
+        ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
+    ways = [
+        way for way in ways if way.rank and not (plate and way.of and way.of[0].sort == "part" and way.rank < _WORDS)
+    ]
+    best = max(ways, key=lambda way: (way.rank, -way.measurement.max()), default=None)
+    others = (way for way in ways if best and way.rank == best.rank and not _same(way.measurement, best.measurement))
+    if best is None or (best.rank <= _NAMED and any(others)):
+        return None
+    return _told(best, found)
+
+
+def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
+    """What may tell measurements apart: nothing, a label, two of them."""
+    several = [one for one in found if one[1].max() + 1 < len(one[1])]
+    yield None
+    yield from several
+    for one, other in combinations(several if len(found[0][1]) <= _COMPARED else [], 2) if found else ():
+        both = _together(one[1], other[1])
+        if max(one[1].max(), other[1].max()) < both.max() < len(both) - 1:
+            values = tuple(" ".join(pair) for pair in zip(one[0].values, other[0].values, strict=True))
+            yield Label("", values, "part"), both, LINE if LINE in (one[2], other[2]) else None
+
+
+def _in_turn(xyz: Floats) -> Iterator[Counted]:
+    """Rows in turn, as many as may be a measurement."""
+    for size in (size for size in range(2, len(xyz) // 2 + 1) if len(xyz) % size == 0):
+        own = np.arange(len(xyz)) // size
+        yield Label("", tuple(f"{one + 1}" for one in own), "turn"), own, None
+
+
+def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Floats) -> Grouping | None:
+    """Places told apart by a label of measurements; ``None`` where two of them would be one."""
+    if of is None:
+        measurements = [np.zeros_like(place)]
+    else:  # words for placements hold, even where a plate has the same places in each, as in its own coordinates
+        placed = counted(of[0], lengths=True) == LINE == of[2] and of[0].sort != "part"
+        measurements = [*([] if placed else [_of_places(of[1], place)]), of[1]]
+    told: list[Grouping] = []
+    for measurement in measurements:
+        at = _together(measurement, place)
+        each, several = int(at.max()) + 1, int(measurement.max()) > 0
+        first = np.sort(np.unique(at, return_index=True)[1])
+        names = [f for f in found if fixes(at, f[1]) and _together(measurement, f[1]).max() + 1 == each]
+        names.sort(key=lambda f: (f[2] != POINT, f[1].max(), f[0].sort == "part"))
+        again = [f for f in names if f[1].max() + 1 < each]  # names that begin again in each measurement
+        if each <= measurement.max() + 1 or (of is not None and of[0].sort == "turn" and each < 6):
+            continue
+        own = measurement[first]
+        points = again[0][1][first] if again else in_turn(own) - 1
+        whole = bool(again) or len(own) == (own.max() + 1) * (points.max() + 1)
+        shape = _shape(xyz[first], own, points) if several and whole else ""
+        point = again[0] if again else None if shape or not names else names[0]
+        if several and not shape and at.max() > place.max() and of is not None and of[2] != LINE:
+            rank = 0.0  # names begin again at places that were there
+        elif several:
+            rank = _rank(of, shape, named=bool(names), again=again[0] if again else None) if of else 0.0
+        else:
+            rank = _NAMED if names or _on_a_ball(xyz[first]) else 0.0
+        told.append(Grouping(rank, of, measurement, at, point))
+        if names:
+            return told[-1]
+    return next(iter(told), None)
+
+
+def _rank(of: Counted, shape: str, *, named: bool, again: Counted | None) -> float:
+    """How much speaks for a label of measurements: the shape of their points, words, names that begin again."""
+    word = {LINE: 0.5, POINT: -0.5}.get(of[2] or "", 0.0)
+    if shape == "same":
+        return _RESTARTED if again and word > 0 and counted(of[0], lengths=True) == LINE else 0.0
+    if shape == "turned":
+        return _TURNED + word
+    if word > 0 and (shape or named):
+        return _WORDS
+    if of[0].sort == "turn" or of[2] == POINT:
+        return 0.0
+    if shape == "moved":
+        return (_NAMED if of[0].sort == "part" else _RESTARTED if of[0].sort == "column" else _MOVED) + word
+    called = again is not None and again[2] == POINT and not {*again[0].values} <= LETTERS
+    return _RESTARTED if again and of[2] is None and (of[0].sort != "part" or called) else 0.0
+
+
+def _together(a: Ints, b: Ints) -> Ints:
+    """A number for each pair."""
+    numbers: Ints = np.unique(a * (int(b.max()) + 1) + b, return_inverse=True)[1].astype(np.int64)
+    return numbers
+
+
+def _same(a: Ints, b: Ints) -> bool:
+    return fixes(a, b) and fixes(b, a)
+
+
+def _of_places(key: Ints, place: Ints) -> Ints:
+    """Labels as one where most of their places are the same, as those of a measurement that was repeated."""
+    groups: list[set[int]] = []
+    holding: dict[int, set[int]] = {}  # groups by place
+    numbers = np.zeros(int(key.max()) + 1, dtype=np.int64)
+    order = np.argsort(key, kind="stable")
+    for one, rows in enumerate(np.split(order, np.flatnonzero(np.diff(key[order])) + 1)):
+        own = {*place[rows].tolist()}
+        near = {g for at in own for g in holding.get(at, ())}
+        fits = [g for g in sorted(near) if len(groups[g] & own) > 0.6 * min(len(groups[g]), len(own))]
+        numbers[one] = g = fits[0] if fits else len(groups)
+        groups += [] if fits else [set()]
+        groups[g] |= own
+        for at in own:
+            holding.setdefault(at, set()).add(g)
+    return numbers[key]
+
+
+def _shape(xyz: Floats, measurement: Ints, point: Ints) -> str:
+    """How places that have the same distances in each measurement lie: ``turned``, ``moved``, or all the ``same``."""
+    size, count = int(measurement.max()) + 1, int(point.max()) + 1
+    if count < 2 or 2 * len(xyz) < size * count or size * count**2 > 4_000_000:
+        return ""
+    own = np.full((size, count, 3), np.nan)
+    own[measurement, point] = xyz
+    own = own[:, np.isfinite(own).all(axis=(0, 2))]  # one that is missing in a measurement is not compared
+    if own.shape[1] < max(2, count / 2):
+        return ""
+    if np.ptp(np.linalg.norm(own[:, :, None] - own[:, None, :], axis=3), axis=0).max() > _RIGID_MM:
+        return ""
+    away = own - own[:1]
+    if np.abs(away).max() < _SAME_PLACE_MM:
+        return "same"
+    return "turned" if np.ptp(away, axis=1).max() > 1 else "moved"
+
+
+def _on_a_plate(xyz: Floats) -> bool:
+    """Whether places (n, 3) lie in one plane, on one square grid."""
+    about = xyz - xyz.mean(axis=0)
+    if len(xyz) < 6 or np.linalg.svd(about)[1][2] > _EVEN_MM * np.sqrt(len(xyz)):
+        return False
+    apart = np.linalg.norm(xyz[1:] - xyz[0], axis=1)
+    one = xyz[1 + int(apart.argmin())] - xyz[0]
+    pitch = np.linalg.norm(one)
+    other = np.cross(np.linalg.svd(about)[2][2], one)
+    steps = (xyz - xyz[0]) @ np.column_stack([one, other]) / pitch**2
+    return bool(np.abs(steps - np.round(steps)).max() * pitch < _EVEN_MM * 2 and np.ptp(steps, axis=0).min() > 0.5)
+
+
+def _on_a_ball(xyz: Floats) -> bool:
+    """Whether places (n, 3) are points probed on one ball: more than enough of them, all round, within a few micrometres."""
+    about = xyz - xyz.mean(axis=0)
+    if len(xyz) < _PROBED or np.linalg.svd(about, compute_uv=False)[2] < _ROUND * np.linalg.norm(about):
+        return False
+    sides = np.column_stack([2 * about, np.ones(len(xyz))])
+    centre = np.linalg.lstsq(sides, np.sum(about**2, axis=1), rcond=None)[0][:3]
+    distance = np.linalg.norm(about - centre, axis=1)
+    return bool(distance.max() < _LARGEST_BALL_MM and np.ptp(distance) < _FORM_MM)
+
+
+def _told(way: Grouping, found: Sequence[Counted]) -> dict[str, list[str]]:
+    """Names of measurement and point, and number of the repeat, of each place."""
+    count, at, measurement = len(way.at), way.at, way.measurement
+    named = [way.of[0].values] if way.of else []
+
+    def visits_told(*own: Counted) -> bool:
+        return bool(_together(at, own[0][1] if len(own) < 2 else _together(own[0][1], own[1][1])).max() + 1 == count)
+
+    visits, run = in_turn(at), None
+    if (most := int(visits.max())) > 1:
+        runs = [f for f in found if f[2] == RUN or f[1].max() + 1 <= most]
+        apart = [f for f in runs if visits_told(f) and (f[2] == RUN or f[1].max() + 1 == most)]
+        run = min(apart, key=lambda f: (f[1].max() + 1 != most, f[2] != RUN), default=None)
+        above = [f for f in found if f[0].sort in ("title", "sheet", "head") and f is not way.of]
+        both = ((one, f) for one in above for f in runs if f is not one and run is None and visits_told(one, f))
+        if (pair := next(both, None)) is not None:  # as two stations from each of which all was measured twice
+            named, run, measurement = [*named, pair[0][0].values], pair[1], _together(measurement, pair[0][1])
+            at = _together(measurement, at)
+    first = np.unique(measurement, return_index=True)[1]
+    texts = [" ".join(one[k] for one in named) or "1" for k in first]
+    columns = {"measurement": [texts[m] for m in measurement.tolist()]}
+    if way.point is not None:
+        columns["point"] = [*way.point[0].values]
+    else:
+        rows = np.sort(np.unique(at, return_index=True)[1])
+        turns = dict(zip(at[rows].tolist(), in_turn(measurement[rows]).tolist(), strict=True))
+        columns["point"] = [f"{turns[one]}" for one in at.tolist()]
+    if int((visits := in_turn(at)).max()) > 1:
+        columns["repeat"] = [f"{n}" for n in (visits if run is None else numbered_runs(run[0].values))]
+    return columns
