@@ -112,8 +112,11 @@ class ProbedFeature:
         if raised:
             local = Raised(displacements, self._in_own_plane(normals), self._in_own_plane(self._offset))
             drawn = self._associated(local)
-            mean = self._offset.mean(axis=0) + displacements @ normals.astype(displacements.dtype) / self.n
-            return Features(self._slid(self._values(drawn), mean), drawn.form, points)
+            values = self._values(drawn)
+            if len(self._unsaid):
+                mean = self._offset.mean(axis=0) + displacements @ normals.astype(displacements.dtype) / self.n
+                values = self._slid(values, mean)
+            return Features(values, drawn.form, points)
         if self.feature.kind == "point":
             values = np.zeros((len(displacements), VALUES))
             values[:, :3] = (self.points + displacements).mean(axis=1)

@@ -238,8 +238,7 @@ def point_errors(virtual: Virtual, draws: int = POINT_DRAWS, seed: int = 0) -> P
     points, random = virtual.plan.points, np.random.default_rng(seed)
     n, rigid = len(points), _rigid(points)
     draws = max(draws // 4, min(draws, draws * LARGE // max(n, 1)))
-    block = max(1, min(draws, _BLOCK // (3 * n)))
-    each = max(1, -(-draws // len(virtual.whole)))
+    block, each = max(1, min(draws, _BLOCK // (3 * n))), max(1, -(-draws // len(virtual.whole)))
     total, first, second = 0, np.zeros((n, 3)), np.zeros((n, 3, 3))
     for place in virtual.whole:
         for start in range(0, each, block):
@@ -304,26 +303,29 @@ def ways(
     doubled: Doubled | None = None, planned: Virtual | None = None,
 ) -> list[Way]:  # fmt: skip
     """The measurement as it is planned first, then what changes it, each alone; what the travel forbids is left out."""
-    first = Virtual(plan, given) if planned is None else planned
-    few, near = thinned(plan, given)
+    first, (few, near) = planned or Virtual(plan, given), thinned(plan, given)
     if few is not plan:  # some of thousands of points say by what part of u each is better
         both = None if doubled is None else lambda: thinned(*doubled(), like=plan)
         compared = ways(few, near, draws, seed, doubled=both, planned=Virtual(few, near, pilot=_PILOT))
         part = spread(first, draws, seed) / np.maximum(compared[0].u, np.finfo(np.float64).tiny)
         return [replace(one, u=part * one.u) for one in compared]
     found = [Way(say("as planned"), spread(first, draws, seed), draws)]
+    places = {given.poses[0].rotation.tobytes(): first.places[0]}
     for name, change in _changes(plan, given, doubled):
         with suppress(CmmUqError):  # beyond the travel
-            found.append(Way(name, spread(Virtual(*change(), pilot=_PILOT, first=first), draws, seed), draws))
+            changed = Virtual(*change(), pilot=_PILOT, first=first)
+            found.append(Way(name, spread(changed, draws, seed), draws))
+            places.setdefault(changed.poses[0].rotation.tobytes(), changed.places[0])
     with suppress(CmmUqError):
         found += _elsewhere(plan, given, first, draws, seed)
-    return found + _means(plan, given, first, draws, seed)
+    return [*found, *_means(given, first, places, draws, seed)]
 
 
-def _means(plan: Plan, given: MeasurementConditions, first: Virtual, draws: int, seed: int) -> list[Way]:
-    """Means of several measurements, in several orientations or in one place."""
-    found, still = list[Way](), np.eye(3)
-    places = {still.tobytes(): first.places[0]}
+def _means(
+    given: MeasurementConditions, first: Virtual, places: dict[bytes, AtPose], draws: int, seed: int
+) -> Iterator[Way]:
+    """Means of several measurements, in several orientations or in one place; ``places`` of the plan by their rotations."""
+    plan, still = first.plan, np.eye(3)
     quarters = [still, _QUARTER_TURN, _HALF_TURN, _HALF_TURN @ _QUARTER_TURN]
     for name, turns in (
         (say("mean of two measurements, the part turned by 180° about Z between them"), quarters[::2]),
@@ -331,15 +333,13 @@ def _means(plan: Plan, given: MeasurementConditions, first: Virtual, draws: int,
         (say("mean of four measurements, the part set up anew in its place each time"), [still] * 4),
     ):
         with suppress(CmmUqError):  # beyond the travel
-            for turn in turns:
-                if turn.tobytes() not in places:
-                    pose = _turned(given.poses[0], turn, plan)
-                    place = AtPose(plan, given, pose, first.known, _PILOT)
-                    places[turn.tobytes()] = place if first.exact else place.condensed()
-            several = [places[turn.tobytes()] for turn in turns]
+            poses = {pose.rotation.tobytes(): pose for turn in turns for pose in [_turned(given.poses[0], turn, plan)]}
+            for key in poses.keys() - places.keys():
+                place = AtPose(plan, given, poses[key], first.known, _PILOT)
+                places[key] = place if first.exact else place.condensed()
+            several = [places[(turn @ given.poses[0].rotation).tobytes()] for turn in turns]
             errors = mean_of_places(several, np.random.default_rng(seed), draws, exact=first.exact)
-            found.append(Way(name, errors.std(axis=0), draws))
-    return found
+            yield Way(name, errors.std(axis=0), draws)
 
 
 def _changes(
@@ -389,7 +389,7 @@ def _elsewhere(plan: Plan, given: MeasurementConditions, first: Virtual, draws: 
 
 def _quick(place: AtPose, seed: int) -> Floats:
     """(c,) standard deviations of what would be read, to first order, of the same draws in every place."""
-    random, parts = np.random.default_rng(seed), in_parts(place.measured.plan, _LOOKED_AT)
+    place, random, parts = place.summed or place, np.random.default_rng(seed), in_parts(place.measured.plan, _LOOKED_AT)
     errors = (place.errors(place.drawn(random, n), inferred=False) for n in parts)
     return np.asarray(np.concatenate([*errors]).std(axis=0))
 

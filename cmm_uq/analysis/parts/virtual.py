@@ -51,8 +51,8 @@ _BLOCK = 400_000  # points of the pilot drawn at once
 _AT_ONCE = 2_000_000
 # the same of a plan of thousands of points, of which a block of few draws is large enough to be quick
 _AT_ONCE_OF_MANY = 500_000
-# points of the whole pilot up to which its blocks are drawn once and kept, 40 MB; else they are drawn again when needed
-_KEPT = 1_600_000
+# bytes of the whole pilot up to which its blocks are drawn once and kept; else they are drawn again when needed
+_KEPT = 80_000_000
 _PILOT_SEED = 20_101  # of these, in every place alike, so that places are compared by the same
 # movements of a block of the pilot, and what adds to its characteristics, the same each time
 _PilotBlock = Callable[[], tuple[Movement, Floats]]
@@ -139,6 +139,7 @@ class AtPose:
         on_points, derivative = evaluator.on_points(), evaluator.derivative()
         fewer = [condensed(cause, plan, on_points, derivative) for cause in self.causes]
         found = self._by(fewer, large & set(on_points))
+        del found.of_machine
         found._inverses = {}
         if self.true is None:
             found.summed = found._by(together(fewer), found.measured.along)
@@ -236,7 +237,7 @@ class AtPose:
         for k, size in enumerate(sizes):
             like = alike(truly, size)
             often = size / np.maximum(truly[like], ROUNDING)
-            part = trial.rows(like).times(often).plus(perfect.rows(np.zeros_like(like)).times(1 - often))
+            part = trial.rows(like).times(often).plus(perfect.times(1 - often))
             found[k] = self.measured.of(only.plus(part), exact=exact, only=i)[:, 0]
         return found
 
@@ -245,7 +246,8 @@ class AtPose:
         at_once = min(self.pilot, max(_BLOCK // len(self.points), 2))
         counts = [min(at_once, self.pilot - first) for first in range(0, self.pilot, at_once)]
         blocks = [partial(self._pilot_block, which, count, exact=exact) for which, count in enumerate(counts)]
-        return [cache(block) for block in blocks] if self.pilot * len(self.points) <= _KEPT else list(blocks)
+        size = (4 if self.measured.along else 24) * self.pilot * len(self.points)
+        return [cache(block) for block in blocks] if size <= _KEPT else list(blocks)
 
     def _pilot_block(self, which: int, count: int, *, exact: bool) -> tuple[Movement, Floats]:
         drawn = self.drawn(np.random.default_rng([_PILOT_SEED, which]), count)
@@ -253,9 +255,11 @@ class AtPose:
 
     def off(self, seed: int = 0, count: int = CHECKED) -> Floats:
         """(c,) root mean square difference of what is read to first order from what is exactly, of its standard deviation."""
-        drawn = self.drawn(np.random.default_rng(seed), count)
-        exact = self.read(drawn, exact=True)
-        apart = self.read(drawn, exact=False) - exact
+        random = np.random.default_rng(seed)
+        drawn = (self.drawn(random, part) for part in in_parts(self.measured.plan, count))
+        found = [[self.read(each, exact=exactly) for exactly in (False, True)] for each in drawn]
+        first, exact = (np.concatenate(each) for each in zip(*found, strict=True))
+        apart = first - exact
         spread = np.maximum(exact.std(axis=0), ROUNDING)
         return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
 
@@ -305,6 +309,7 @@ class Virtual:
         self.whole: list[AtPose] = self.places
         if not self.exact:
             self.places = [place.condensed() for place in self.places]
+            self.whole = self.whole if first is None else []
 
     @property
     def names(self) -> list[str]:

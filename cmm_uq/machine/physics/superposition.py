@@ -59,16 +59,24 @@ class Superposition:
         """Errors e (n, 3), mm, of points as indicated, for coefficients (k,)."""
         arm = self._arm(points, coefficients)
         if arm is not None:
-            others = self.derivatives(About(points)) @ np.where(self._of_rows, 0.0, coefficients)
+            others = self._sum(About(points), np.where(self._of_rows, 0.0, coefficients))
             columns = points.columns
             return np.asarray(others + arm.posed(columns).tool - arm_of(points).posed(columns).tool, dtype=np.float64)
         squareness = self._squareness(points, coefficients)
         if squareness is None:
-            return np.asarray(self.derivatives(About(points)) @ coefficients, dtype=np.float64)
+            return self._sum(About(points), coefficients)
         directions = axis_directions(squareness)
-        others = np.where(self.leans, 0.0, coefficients)
-        e = self.derivatives(About(replace(points, directions=directions))) @ others
+        e = self._sum(About(replace(points, directions=directions)), np.where(self.leans, 0.0, coefficients))
         return np.asarray(e + leaning(points.carriages, directions), dtype=np.float64)
+
+    def _sum(self, about: About, coefficients: Floats) -> Floats:
+        """(n, 3) of all effects to first order, one after the other: columns of all together are hundreds of megabytes."""
+        e, start = np.zeros((len(about.points), 3)), 0
+        for effect in self.effects:
+            own = coefficients[start : (start := start + len(effect.coefficients))]
+            if own.any():
+                e += about.columns(effect, self.shapes.get(effect.name, ())) @ own
+        return e
 
     def about(self, true: Points, coefficients: Floats) -> About:
         """Where columns are linear about coefficients (k,).

@@ -21,6 +21,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -32,10 +33,12 @@ from cmm_uq.base.points import Floats, Ints
 LARGE = 1000  # points of a feature from which on its points are not drawn one coordinate after the other
 _NOTHING = 1e-12  # part of the largest variance below which a component of a random field is rounding
 _UNSEEN_MM = 1e-11  # root mean square displacement for one unit of a coefficient below which a component is left out
-_FACTORED = 64  # coefficients up to which no components are looked for
+_FACTORED = 32  # coefficients up to which no components are looked for; a field, one factor, has the fewest already
 _ROUNDING = 1e-15  # of the largest, a square of components that is rounding
 MANY = 1000  # points up to which the eigenvectors of the whole covariance are quickly found
-_LEFT = 1e-8  # of the largest variance that may be left of a point's: a ten-thousandth of a standard deviation
+_LEFT = 1e-7  # of the largest variance that may be left of a point's
+_LEAST = 1e-6  # of the variance of a field's points that its least components may have together: a thousandth of u
+HEIGHTS: Any = np.float32  # in which points of large features are raised: 1 µm is then off by 10⁻⁷ µm
 Covariance = Callable[[slice], Floats]  # covariance (m, n) of some points with all n
 
 
@@ -86,25 +89,23 @@ class PartCause(ABC):
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CommonCause(PartCause):
     basis: Floats  # (K, n, 3) displacements of the points for one unit of each coefficient, mm
-    _raising: dict[tuple[int, int], tuple[Floats, Floats]] = field(default_factory=dict, init=False)
+    into: Floats | None = None  # (K, r) components of each coefficient, where ``basis`` is of r components
 
     def through(self, derivative: Floats) -> Floats:
         K, n, _ = self.basis.shape
-        return np.asarray(self.basis.reshape(K, 3 * n) @ derivative.reshape(len(derivative), 3 * n).T)
+        found = self.basis.reshape(K, 3 * n) @ derivative.reshape(len(derivative), 3 * n).T
+        return np.asarray(found if self.into is None else self.into @ found)
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
-        part = self.basis[:, rows]
+        part, acting = self.basis[:, rows], coefficients if self.into is None else coefficients @ self.into
         K, m, _ = part.shape
-        return np.asarray((coefficients @ part.reshape(K, 3 * m)).reshape(len(coefficients), m, 3))
+        return np.asarray((acting @ part.reshape(K, 3 * m)).reshape(len(coefficients), m, 3))
 
-    def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
-        key = rows.start, rows.stop
-        if key not in self._raising:
-            self._raising[key] = _few(np.einsum("kmi,mi->km", self.basis[:, rows], normals))
-        left, right = self._raising[key]
-        if not len(right):
-            return np.zeros((len(coefficients), 1))
-        return np.asarray((coefficients @ left).astype(right.dtype) @ right)
+    def raising(self, rows: slice, normals: Floats) -> tuple[Floats, Floats]:
+        """Factors (K, r) and (r, m) by which coefficients raise points along normals (m, 3), of those that do."""
+        raised = np.einsum("kmi,mi->km", self.basis[:, rows], normals)
+        acting = np.abs(raised).max(axis=1, initial=0.0) > 0
+        return (np.eye(len(raised)) if self.into is None else self.into)[:, acting], raised[acting].astype(HEIGHTS)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -140,14 +141,21 @@ class PointScatter(PartCause):
         return np.asarray(along @ self.turn)
 
 
-def _few(heights: Floats) -> tuple[Floats, Floats]:
-    """Factors (K, r) and (r, m) of heights (K, m), of as few components as these have where they are many; of seven digits."""
-    if len(heights) <= _FACTORED:
-        acting = np.flatnonzero(np.abs(heights).max(axis=1, initial=0.0) > 0)
-        return np.eye(len(heights))[:, acting], heights[acting].astype(np.float32)
-    values, vectors = np.linalg.eigh(heights @ heights.T)
-    left = vectors[:, values > heights.shape[1] * _UNSEEN_MM**2 + _ROUNDING * values[-1]]
-    return left, np.asarray(left.T @ heights, dtype=np.float32)
+def _few(heights: Floats) -> Floats:
+    """(K, r) orthonormal, of which heights (K, m) are components, of as few as these have where they are many.
+
+    Components show in a few random sums of the columns (Halko, Martinsson, Tropp 2011, SIAM Rev. 53, 217).
+    """
+    K, m = heights.shape
+    sums = _FACTORED
+    while 2 * sums < K:
+        some = heights @ np.random.default_rng(0).standard_normal((m, sums))
+        left, sizes, _ = np.linalg.svd(some, full_matrices=False)
+        seen = sizes**2 > m * _UNSEEN_MM**2 + _ROUNDING * sizes[0] ** 2
+        if not seen[-1]:
+            return left[:, seen]
+        sums *= 2
+    return np.eye(K)
 
 
 def normal(sd: ArrayLike) -> Draw:
@@ -188,7 +196,8 @@ def field_components(covariance: Covariance, variances: Floats) -> Floats:
         left -= found[count] ** 2
         left[pivot] = 0.0
         count += 1
-    return found[:count].copy()
+    values, vectors = np.linalg.eigh(found[:count] @ found[:count].T)
+    return np.asarray(vectors[:, np.cumsum(values) > _LEAST * values.sum()].T @ found[:count])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -266,8 +275,8 @@ class CondensedCause(PartCause):
         start, stop, _ = rows.indices(len(self.normals))
         first, last = np.searchsorted(self.single, [start, stop]).tolist()
         skipped = len(self.vectors) * len(self.whole)
-        sizes = self._sizes[first:last].astype(coefficients.dtype)
-        return coefficients[:, skipped + first : skipped + last] * sizes, self.single[first:last]
+        own, sizes = coefficients[:, skipped + first : skipped + last], self._sizes[first:last]
+        return own if (sizes == 1).all() else own * sizes.astype(own.dtype), self.single[first:last]
 
 
 def together(causes: Sequence[PartCause]) -> list[PartCause]:
@@ -275,20 +284,23 @@ def together(causes: Sequence[PartCause]) -> list[PartCause]:
     alone = [one for one in causes if isinstance(one, CondensedCause) and len(one.single) == len(one.factors)]
     if len(alone) < 2:
         return list(causes)
-    first, squares = alone[0], [(one._sizes**2).astype(np.float32) for one in alone]
+    first, squares = alone[0], [one._sizes**2 for one in alone]
+    squares = [square if np.ptp(square) else square[:1] for square in squares]
 
     def draw(random: np.random.Generator, n: int) -> Floats:
-        variance = np.zeros((n, len(first.single)), dtype=np.float32)
+        variance = np.zeros((n, 1))
         for one, square in zip(alone, squares, strict=True):
-            variance += square if one.scale is None else square * (np.asarray(one.scale(random, n)) ** 2 @ one.share)
-        return np.asarray(np.sqrt(variance, out=variance) * random.standard_normal(variance.shape, dtype=np.float32))
+            each = square if one.scale is None else square * (np.asarray(one.scale(random, n)) ** 2 @ one.share)
+            variance = variance + each
+        drawn = random.standard_normal((n, len(first.single)), dtype=HEIGHTS)
+        return np.multiply(drawn, np.sqrt(variance, dtype=HEIGHTS), out=drawn)
 
     one = replace(first, draw=draw, vectors=first.normals[None], scale=None, share=np.ones((1, 1)))
     return [*(cause for cause in causes if cause not in alone), one]
 
 
 def condensed(cause: PartCause, plan: Plan, on_points: Collection[str], derivative: Floats) -> PartCause:
-    """A cause by fewer coefficients, where it moves each point of a large feature on its own; else itself.
+    """A cause by fewer coefficients, where it moves each point of a large feature on its own, or by fewer components.
 
     ``derivative``: (p, n, 3) of all that follows to first order.
     """
@@ -298,10 +310,12 @@ def condensed(cause: PartCause, plan: Plan, on_points: Collection[str], derivati
         scale, vectors = cause.scale, cause.size.T[:, :, None] * cause.turn[:, None, :]
     elif isinstance(cause, Rough):
         vectors[0, cause.rows] = cause.along
-    else:
-        return cause
     large = {name for name, rows in plan.rows.items() if rows.stop - rows.start >= LARGE}
     single = _rows(plan, large & set(on_points))
+    if isinstance(cause, CommonCause) and len(cause.basis) > _FACTORED and len(set(cause.factors)) > 1:
+        return _factored(cause, single, _rows(plan, set(plan.rows) - large), plan.normals, derivative)
+    if not isinstance(cause, PointScatter | Rough):
+        return cause
     rest, acts = _rows(plan, large - set(on_points)), np.abs(vectors).max(axis=(0, 2)) > 0
     whole = np.setdiff1d(np.flatnonzero(acts), np.concatenate([single, rest]))
     sums = _summed(vectors[:, rest], derivative[:, rest])
@@ -324,6 +338,15 @@ def condensed(cause: PartCause, plan: Plan, on_points: Collection[str], derivati
         name=cause.name, factors=(cause.factors[0],) * (a * w + s + a * r), draw=draw, named=cause.named, vectors=vectors,
         whole=whole, single=single, normals=plan.normals, sums=sums, scale=scale, share=share,
     )  # fmt: skip
+
+
+def _factored(cause: CommonCause, single: Ints, others: Ints, normals: Floats, derivative: Floats) -> CommonCause:
+    """By as few components as rows that are moved along their normals, other rows and a derivative tell apart."""
+    heights = np.einsum("kmi,mi->km", cause.basis, normals)[:, single]
+    of_others = cause.basis[:, others].reshape(len(heights), -1)
+    left = _few(np.hstack([heights, of_others, cause.through(derivative)]))
+    basis = np.tensordot(left.T, cause.basis, axes=1)
+    return cause if left.shape[1] == len(left) else replace(cause, basis=basis, into=left)
 
 
 def _rows(plan: Plan, names: Collection[str]) -> Ints:
