@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
+from cmm_uq.analysis.conformity.statement import NOT_CONVERGED, Statement, by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistakes
 from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.analysis.machine.state import of_machine
@@ -290,6 +290,8 @@ class Result:
         tolerances, against = self.job.facts.model.tolerances, [what for what, _ in self.job.circumstances.lapsed]
         if self.job.facts.recording.measurements_aside:
             against.insert(0, say("it is estimated without the measurements that the laboratory set aside"))
+        if not self.posterior.converged:
+            against.insert(0, NOT_CONVERGED)
         found = [by_standard(statement) for statement in self.statements]
         for effect in self.model.effects:
             if effect.name in tolerances:

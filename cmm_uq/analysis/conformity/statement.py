@@ -166,6 +166,7 @@ def by_tolerance(
     return Verdict(name, outcome, quantity.value, quantity.expanded, tolerance, quantity.unit, title=title)
 
 
+NOT_CONVERGED = say("the sampling did not converge")
 OUTSIDE = ("fail", "conditional fail")  # outcomes of a value that lies outside
 # Outcomes of one outside the zone of conformance: further readings stand for it, too, where they were made, or a larger
 # error would pass where a smaller one does not.

@@ -254,7 +254,7 @@ class ShiftResult(ShiftFound):
     def statements(self) -> tuple[Statement, ...]:
         found = [(self.linearity, MICROMETRE, NOTHING)]
         figure = shared.figure_of(self.job.points, found, [float(np.ptp(self.estimate.series.span))])
-        return shared.decided(self.job, {shared.OF_AN_AXIS: figure})
+        return shared.decided(self, {shared.OF_AN_AXIS: figure})
 
     @cached_property
     def reported(self) -> Reported:

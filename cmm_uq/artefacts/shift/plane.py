@@ -224,7 +224,7 @@ class PlaneShiftResult(ShiftFound):
             found["squareness"] = shared.figure_of(
                 self.job.points, [(angle, ARCSECOND * arm, title(square.name))], [arm]
             )
-        return shared.decided(self.job, found)
+        return shared.decided(self, found)
 
     @cached_property
     def reported(self) -> Reported:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.standards import decidable, statement
-from cmm_uq.analysis.conformity.statement import Statement, by_standard
+from cmm_uq.analysis.conformity.statement import NOT_CONVERGED, Statement, by_standard
 from cmm_uq.artefacts.kinds import SHIFT, ShiftFacts
 from cmm_uq.artefacts.shift.smooth import Coefficients
 from cmm_uq.base.errors import CmmUqError
@@ -263,10 +263,13 @@ def figure_of(
     return ArtefactFigure(size * value, rows, np.array(lengths_mm), size * u, tuple(name for _, _, name in each))
 
 
-def decided(job: Job, figures: Mapping[str, ArtefactFigure]) -> tuple[Statement, ...]:
+def decided(found: ShiftFound, figures: Mapping[str, ArtefactFigure]) -> tuple[Statement, ...]:
+    job, under = found.job, found.job.circumstances
     readings = ShiftedReadings(job.points, figures)
+    if not found.estimate.chains.converged:
+        under = replace(under, lapsed=(*under.lapsed, (NOT_CONVERGED, "")))
     return tuple(
-        statement(wish, readings, {}, f"[[conformity]] {i}", SHIFT.tested, None, job.circumstances)
+        statement(wish, readings, {}, f"[[conformity]] {i}", SHIFT.tested, None, under)
         for i, wish in enumerate(job.facts.conformity, 1)
     )
 

@@ -187,8 +187,12 @@ def _checked(
     if one.standing == "nothing compared":
         why = say("{why}; the interim check of {day} has no value in common with the calibration", why=why, day=at)
         return planned, why
-    extended = planned
-    if rule.method == "fixed" and rule.longest_months is not None:
+    extended, lengthens = planned, rule.method == "fixed" and rule.longest_months is not None
+    if lengthens and not one.proves:
+        return planned, say(
+            "{why}; the interim check of {day}, in control, shows too little to lengthen it", why=why, day=at
+        )
+    if lengthens and rule.longest_months is not None:
         carried = RecalibrationInterval((planned - last.day).days, None, why)
         extended = min(_ends(one.certificate.day, carried), after_months(last.day, rule.longest_months))
     if extended <= planned:

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from statistics import NormalDist
 from typing import Any, Literal
@@ -220,6 +220,7 @@ class InterimCheck:
     ratio: float  # its difference from the calibration in units of the difference's standard uncertainty
     warning: float
     action: float
+    proves: bool  # whether it shows, with its uncertainty, all that the calibration limits to be within: see :func:`_proves`
 
 
 def limit_for(count: int, single: float) -> float:
@@ -229,15 +230,30 @@ def limit_for(count: int, single: float) -> float:
 
 def check_standings(calibration: RecordedCertificate, checks: Sequence[RecordedCertificate]) -> list[InterimCheck]:
     """Each check since the calibration, by day and without an adjustment between, by the rule."""
-    stated = {one.name: _stated(one, calibration) for one in calibration.values if is_of_machine(one.unit)}
+    own = [one for one in calibration.values if is_of_machine(one.unit)]
+    stated, limits = {one.name: _stated(one, calibration) for one in own}, {one.name: one.limit for one in own}
     found: list[InterimCheck] = []
     before: dict[str, ValueChange] = {}
-    for check in checks:
+    for given in checks:
+        # a check that states no limits is held to those of the calibration
+        limited = tuple(replace(one, limit=one.limit or limits.get(one.name)) for one in given.values)
+        check = replace(given, values=limited)
         known = (one for one in check.values if one.name in stated)
         changes = {one.name: change(stated[one.name], _stated(one, check)) for one in known}
-        found.append(_checked(check, changes, before))
+        found.append(replace(_checked(check, changes, before), proves=_proves(own, check)))
         before = changes
     return found
+
+
+def _proves(calibrated: Sequence[RecordedValue], check: RecordedCertificate) -> bool:
+    """Whether a check shows, with U, all values within that the calibration limits; without limits, all half as well as it."""
+    there = {one.name: one for one in check.values}
+    asked = [one for one in calibrated if one.limit] or calibrated
+    return all(
+        (now := there.get(one.name)) is not None
+        and (abs(now.value) + WARNING * now.u <= one.limit if one.limit else now.u <= 2 * one.u)
+        for one in asked
+    )
 
 
 def _checked(
@@ -259,7 +275,7 @@ def _checked(
         standing = "action"
     elif abs(furthest) > warning:
         standing = "warning"
-    return InterimCheck(check, standing, titles.get(worst, ""), furthest, warning, action)
+    return InterimCheck(check, standing, titles.get(worst, ""), furthest, warning, action, proves=False)
 
 
 def _stated(value: RecordedValue, certificate: RecordedCertificate) -> ComparedValue:

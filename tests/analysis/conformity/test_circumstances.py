@@ -7,17 +7,20 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import cmm_uq
+from cmm_uq.analysis.conformity.own_rule import NAME as OWN_RULE
 from cmm_uq.analysis.conformity.standards import statement
-from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.statement import NOT_CONVERGED, Statement
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import StepGauge
+from cmm_uq.artefacts.shift.axis import ShiftResult
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.clauses import formal_warnings
@@ -29,10 +32,12 @@ from cmm_uq.jobs.tables.conformity import (
     RatedConditions,
     TestUncertainty,
 )
+from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.analysis.conformity.recorded import STATED, bars, gauge, sphere
+from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
 from tests.recordings import with_columns
 
@@ -358,3 +363,26 @@ def test_a_job_without_a_date_beside_dated_certificates_says_that_the_day_is_mis
     (lapsed,) = job.circumstances.lapsed
     assert lapsed == ("traceability (artefact: the day of the measurement is not stated)", "[job] date")
     assert not [text for text in formal_warnings(job) if "1970" in text]
+
+
+def test_figures_of_draws_that_did_not_converge_pass_nothing() -> None:
+    """The page says that they must not be used."""
+    found = analysed("sphere-simulated")
+    model = found.job.facts.model.model_copy(update={"tolerances": {"probe_lobing": 2.0}})
+    job = replace(found.job, facts=found.job.facts.model_copy(update={"model": model}))
+    for rhat_max, outcome in ((1.0, "pass"), (1.5, "undecided")):
+        posterior = replace(found.posterior, rhat_max=rhat_max)
+        assert replace(found, job=job, posterior=posterior).verdicts[-1].outcome == outcome
+    axis = cast("ShiftResult", analysed("shift-source-simulated"))
+    facts = ConformityFacts(
+        standard=OWN_RULE,
+        characteristic="linearity",
+        limit_um=1000.0,
+        rule="simple",
+        complete=CompleteTest(measurements=1, repeats=1, points=1),
+    )
+    wished = replace(axis.job, facts=axis.job.facts.model_copy(update={"conformity": [facts]}))
+    for rhat_max in (1.0, 1.5):
+        chains = replace(axis.estimate.chains, rhat_max=rhat_max)
+        (one,) = replace(axis, job=wished, estimate=replace(axis.estimate, chains=chains)).statements
+        assert (NOT_CONVERGED in one.missing) == (rhat_max > 1.01)

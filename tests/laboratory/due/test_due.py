@@ -14,7 +14,7 @@ from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, after_months, 
 from cmm_uq.laboratory.due.history import YEAR, epochs, machine_history, trend
 from cmm_uq.laboratory.due.intervals import series_from
 from cmm_uq.laboratory.due.rule import Rule
-from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine
+from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine, RecordedValue
 from tests.laboratory.due.histories import MACHINE, FIRST_of_made, certificate, series, value
 
 ON = dt.date(2025, 1, 1)
@@ -152,6 +152,30 @@ def test_checks_in_control_lengthen_only_where_the_rule_lets_them() -> None:
     assert due(*checked, rule={"every_months": 12, "longest_months": 24}).due == dt.date(2025, 6, 1)
     late = certificate(FIRST_of_made), check(dt.date(2024, 12, 1), 1.2)
     assert due(*late, rule={"every_months": 12, "longest_months": 18}).due == dt.date(2025, 9, 1)
+
+
+@pytest.mark.parametrize(("calibrated", "checked", "lengthens"), [
+    ([value(1.0, limit=10.0)], [value(1.2, limit=10.0)], True),
+    ([value(1.0, limit=10.0)], [replace(value(1.2, limit=10.0), u=5.0)], False),  # 1.2 ± 10
+    ([value(1.0, limit=10.0), value(1.0, name="scale_y.ppm", limit=10.0)], [value(1.2, limit=10.0)], False),
+    ([value(1.0, limit=10.0), replace(value(1.0, name="scale_y.ppm"), limit=None)], [value(1.2, limit=10.0)], True),
+    ([replace(value(1.0), limit=None)], [replace(value(1.2), limit=None)], True),
+    ([replace(value(1.0), limit=None)], [replace(value(1.2), limit=None, u=5.0)], False),
+])  # fmt: skip
+def test_a_check_lengthens_by_what_it_shows_and_not_by_what_it_cannot_see(
+    calibrated: list[RecordedValue], checked: list[RecordedValue], lengthens: bool
+) -> None:
+    one = certificate(FIRST_of_made, *calibrated), certificate(dt.date(2024, 6, 1), *checked, interim=True)
+    found = due(*one, rule={"every_months": 12, "longest_months": 24})
+    assert found.due == (dt.date(2025, 6, 1) if lengthens else dt.date(2025, 3, 1))
+    assert ("shows too little to lengthen it" in found.why) != lengthens
+
+
+def test_a_check_without_limits_is_held_to_those_of_the_calibration() -> None:
+    """9.8 ± 2 against 10, then 10.5 ± 2, of which the check states no limit."""
+    day = dt.date(2024, 6, 1)
+    first, then = value(9.8, limit=10.0), replace(value(10.5), limit=None)
+    assert due(certificate(FIRST_of_made, first), certificate(day, then, interim=True)).due == day
 
 
 def test_a_check_of_other_values_lengthens_nothing() -> None:
