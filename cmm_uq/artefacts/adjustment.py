@@ -204,12 +204,13 @@ def _adjustments(settings: tuple[AdjustmentSetting, ...], order: Iterable[str]) 
         "right-handed about the named axis.", first=first, second=second, third=third,
     )  # fmt: skip
     doubt = say(
-        "Beyond doubt: the 95 % interval does not contain zero. Over the travel: what the adjustment moves at its far end."
+        "Significant: the 95 % interval, which holds for the recorded set-ups, does not contain zero; elsewhere in the "
+        "measuring range the factors may differ. Over the travel: what the adjustment moves at its far end."
     )
     stated, over_travel = figure_columns(say("Value"), say("U")), Column(say("Over the travel"), unit("µm"))
     return table(
         say("What to turn and what to enter"),
-        [say("Adjustment"), *stated, say("Unit"), over_travel, say("Beyond doubt")], rows, turning, doubt,
+        [say("Adjustment"), *stated, say("Unit"), over_travel, say("Significant")], rows, turning, doubt,
     )  # fmt: skip
 
 

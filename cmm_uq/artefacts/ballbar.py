@@ -42,7 +42,7 @@ from cmm_uq.machine.model.recorded import expansion, length_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budget_results import budget_data
-from cmm_uq.maths.uncertainty.quantity import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded, significant
 
 
 class Ballbar(Artefact):
@@ -281,9 +281,12 @@ def sections(result: Result) -> list[Section]:
         reference=say("{name} {length:.4f}\u00a0mm", name=name, length=lengths.reference),
         reference_expanded_um=2 * size.sd / MICROMETRE if size.certified else 0.0,
     )  # fmt: skip
+    combined = say("Combined: u = {u} µm.", u=significant(budget.u))
     return [
         Section(say("Lengths"), (plot, residual_volume(result, say("bars")), _table(lengths, name))),
-        Section(say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), budget))),
+        Section(
+            say("Budget of one length"), tuple(budget_blocks(say("the deviation of one length"), budget, combined))
+        ),
         *bar.further_sections(result),
         adjustment.section(result, _second_way(result, bar)),
     ]

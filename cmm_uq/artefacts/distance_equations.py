@@ -167,8 +167,8 @@ def refuse_poor_placings(differences: Floats) -> None:
         problem = say("all {count} distances lie in one plane, so they tell nothing of the axis across it", count=count)
     else:
         problem = say("the directions of the {count} distances leave a factor of scale or squareness open", count=count)
-    one = say("Add {count} placing: {wanted}", count=len(wanted), wanted=commas(wanted))
-    many = say("Add {count} placings: {wanted}", count=len(wanted), wanted=commas(wanted))
+    one = say("Add {count} set-up: {wanted}", count=len(wanted), wanted=commas(wanted))
+    many = say("Add {count} set-ups: {wanted}", count=len(wanted), wanted=commas(wanted))
     raise CmmUqError(problem, where="recording", fix=plural(len(wanted), one=one, many=many))
 
 

@@ -56,6 +56,7 @@ class Plate(Rigid):
     kind = "plate"
     title = say("Plate")
     size_title: ClassVar[Text] = say("Length of the plate")
+    size_what: ClassVar[Text] = say("length")
     plural: ClassVar[str] = "the recorded plates"  # what is measured, for messages
     mend: ClassVar[str] = "Check the numbering of the balls and their reference positions"
 
@@ -75,7 +76,7 @@ class Plate(Rigid):
         self.body = body - self.placings.means(body)
         length = facts.length_mm or longest
         sd = self.certificate.sd(length, from_first, farthest)
-        self.sizes = (Size("length_mm", self.size_title, unit("mm"), length, sd, say("length")),)
+        self.sizes = (Size("length_mm", self.size_title, unit("mm"), length, sd, self.size_what),)
         self._together = self.body / self.sizes[0].nominal
         if not self.certificate.plain and self.sizes[0].certified:
             about = self.reference - self.placings.means(self.reference)
@@ -326,11 +327,11 @@ def _table(result: Result, found: PlateFigures) -> Table | None:
     )
     sizes = (say("rms before"), say("Largest before"), say("rms after"), say("Largest after"))
     note = say(
-        "Coordinates of every ball minus its reference position, before and after the fitted model; the placing is fitted."
+        "Coordinates of every ball minus its reference position, before and after the fitted model; the set-up is fitted."
     )
     return table(
         say("Deviation of a coordinate"),
-        (say("Placing"), Column(say("Balls")), *figure_columns(*sizes, unit=unit("µm"))),
+        (say("Set-up"), Column(say("Balls")), *figure_columns(*sizes, unit=unit("µm"))),
         rows,
         note,
     )

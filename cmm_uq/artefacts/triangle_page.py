@@ -124,7 +124,7 @@ def _plane(corner: Floats, number: int) -> str:
     raise CmmUqError(
         say("measurement {number}: side 1–2 and the height over it do not lie along X and Y, Y and Z, or X and Z",
             number=number),
-        where="recording", fix=say("Align the triangle, or use the fitted model, which serves every placing"),
+        where="recording", fix=say("Align the triangle, or use the fitted model, which serves every set-up"),
     )  # fmt: skip
 
 
@@ -177,9 +177,9 @@ def _pair(found: list[Defects], plane: str, differing: int, missing: Text) -> tu
     alike = np.all(np.delete(apart, differing, axis=2) < _ANOTHER_PLACE, axis=2)
     gain = np.where(alike, apart[:, :, differing], 0.0)
     if not len(own) or gain.max() < _ANOTHER_PLACE:
-        problem = say("{count} placings in {plane} lack one that the source's equations compare",
+        problem = say("{count} set-ups in {plane} lack one that the source's equations compare",
                       count=len(own), plane=Verbatim(plane))  # fmt: skip
-        raise CmmUqError(problem, where="recording", fix=say("Add a placing: {missing}", missing=missing))
+        raise CmmUqError(problem, where="recording", fix=say("Add a set-up: {missing}", missing=missing))
     i, j = sorted(np.unravel_index(int(np.argmax(gain)), gain.shape), key=lambda k: float(at[k, differing]))
     return own[i], own[j]
 
@@ -316,7 +316,7 @@ def _sides(result: Result, measurement: Ints, sides: Floats, left: Floats, expan
     return deviations_plot(
         result, sides.ravel(), say("{count} sides: as recorded they deviate", count=sides.size),
         position=measurement.repeat(3).astype(float), after_um=left.ravel(), expanded_um=expanded_um,
-        reference=say("certified side"), position_label=say("Placing (its three sides side by side)"), caption=caption,
+        reference=say("certified side"), position_label=say("Set-up (its three sides side by side)"), caption=caption,
     )  # fmt: skip
 
 
@@ -333,7 +333,7 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> Bloc
         rows.append((effect.title, *rounded(value, U), *fitted, effect.reported[0].unit))
     figures = figure_columns(say("Equations"), say("U"), say("Fitted model"), say("U"))
     note = say(
-        "Equations: one after the other from the sides of aligned placings (Manlay, Fast checking of "
+        "Equations: one after the other from the sides of aligned set-ups (Manlay, Fast checking of "
         "CMM geometry with a patented tool), each from a few of the observations, U for a coverage probability of 95 %, "
         "conditional on white noise. Fitted model: all observations at once, U averaged over what the noise may be."
     )
@@ -347,7 +347,7 @@ def _alike(result: Result) -> Block | None:
         say("{one} and {other} ({correlation})", one=titles[a], other=titles[b], correlation=signed(c, "+.2f"))
         for a, b, c in hardly_told_apart(result)
     ]
-    text = say("Hardly told apart by these placings (correlation): {pairs}.", pairs=semicolons(pairs))
+    text = say("Hardly told apart by these set-ups (correlation): {pairs}.", pairs=semicolons(pairs))
     return Paragraph(text, tone="note") if pairs else None
 
 

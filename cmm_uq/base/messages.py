@@ -114,7 +114,7 @@ class PatternFormatter(string.Formatter):
     def format_field(self, value: Any, format_spec: str) -> str:
         """One argument; ``capital`` and ``small`` change the first letter of a text."""
         if format_spec not in ("capital", "small"):
-            return format(value, format_spec)
+            return printed(value, format_spec)
         first, rest = str.__getitem__(value, slice(0, 1)), str.__getitem__(value, slice(1, None))
         return (first.upper() if format_spec == "capital" else first.lower()) + rest
 
@@ -143,14 +143,22 @@ def plural(count: int, *, one: Message, many: Message) -> Plural:
     return Plural(count, one, many)
 
 
+def printed(value: Any, spec: str) -> str:
+    """As a format specification says; of numbers ``100``, not ``1e+02``, and ``0.00``, not ``-0.00``."""
+    text = format(value, spec)
+    if spec.endswith("g") and "e+0" in text:
+        return f"{float(text):.0f}"
+    return text if isinstance(value, str) or text.strip("-0.") else text.removeprefix("-")
+
+
 def number(value: float, spec: str = "") -> Number:
     """A number rounded as a format specification says: ``number(x, ".2f")``."""
-    return Number(format(value, spec))
+    return Number(printed(value, spec))
 
 
 def signed(value: float, spec: str) -> Number:
     """The same with the minus sign of print."""
-    return Number(format(value, spec).replace("-", "−"))
+    return Number(printed(value, spec).replace("-", "−"))
 
 
 def day(date: dt.date) -> Day:

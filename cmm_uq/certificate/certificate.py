@@ -103,7 +103,7 @@ def _particulars(of: Job) -> tuple[Facts, ...]:
             (say("Manufacturer, model"), ", ".join(filter(None, (machine.manufacturer, machine.model)))),
             (say("Serial number"), machine.serial),
             (say("Owner"), machine.owner),
-            (say("Measuring range"), say("{travel} mm", travel=commas(travel)) if travel else NOTHING),
+            (say("Measuring range"), say("{travel}\u00a0mm", travel=commas(travel)) if travel else NOTHING),
             (say("Place"), job.place),
         ),
         (method, *conditions(of).rows, *traced, *others),

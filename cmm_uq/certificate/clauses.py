@@ -94,8 +94,9 @@ def traceability(result: Result) -> Section:
     dimensions = [size for size in result.artefact.sizes if size.role == "dimension"]
     certified = [] if compared else [size for size in dimensions if size.certified]
     rows += [
-        (say("Certified {what} at 20 °C", what=size.what or say("{title:small}", title=size.title)),
-         _with_u(nominal(size.nominal), size.unit, size.sd / MICROMETRE))
+        (size.title if size.what == size.title else  # of an instrument, which is read and not certified
+         say("Certified {what} at 20 °C", what=size.what or say("{title:small}", title=size.title)),
+         _with_u(nominal(round(size.nominal, 5)), size.unit, size.sd / MICROMETRE))
         for size in certified
     ]  # fmt: skip
     if certified:
@@ -180,9 +181,7 @@ Status = Literal["stated", "missing", "not applicable", "laboratory"]
 
 STATEMENTS = (
     say("The results relate only to the item named above, in its condition and place at the time of the measurement."),
-    say(
-        "This certificate shall not be reproduced except in full without the written approval of the issuing laboratory."
-    ),
+    say("This document shall not be reproduced except in full without the written approval of the issuing laboratory."),
 )
 """ISO/IEC 17025:2017, 7.8.2.1 l) and the note to 7.8.2.1."""
 

@@ -85,10 +85,6 @@ class Column:
     numeric: bool = True
 
 
-def text_columns(*headings: Text) -> tuple[Column, ...]:
-    return tuple(Column(heading, numeric=False) for heading in headings)
-
-
 def figure_columns(*headings: Text, unit: Text = NOTHING) -> tuple[Column, ...]:
     return tuple(Column(heading, unit) for heading in headings)
 

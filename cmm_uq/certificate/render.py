@@ -73,7 +73,7 @@ SMALLEST = 0.66  # of a picture's width: its lettering is 5 pt then
 _PAGE = 256.0  # height of the text
 _BROWSER = 1.3  # times as high as in the PDF is what a browser prints
 _MEASURED = 0.85  # of the height that is reckoned from letters, what Typst makes of it
-_LONG, _NAME = 120, 45  # letters from which a text is given by its beginning, and least letters of that
+_LONG, _NAME = 130, 45  # letters from which a text is given by its beginning, and least letters of that
 _CUT = re.compile(r"(?<=[.;:])\s|(?<=[。；：])")
 _IN_FULL = say("In full behind this page.")
 _REMARKS = ("Remarks", "Deviations from the method", "Results of external providers", "Data from the customer")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -124,10 +125,7 @@ def title_of(key: tuple[str, str], result: Result) -> Text:
     owner, name = key
     if owner == ARTEFACT:
         return next(size.title for size in result.artefact.sizes if size.name == name)
-    effect = next(effect for effect in result.model.effects if effect.name == owner)
-    return (
-        effect.title if len(effect.reported) == 1 else say("{title}, {name}", title=effect.title, name=Verbatim(name))
-    )
+    return parameter_title(owner, name, result.model.effects)
 
 
 def refusal(error: CmmUqError) -> Text:
@@ -258,7 +256,8 @@ def size_of(effect: Effect | None, parameters: Mapping[str, Quantity], *, factor
 
 def _what(effect: Effect | None, name: str) -> Text:
     parameters = () if effect is None else (*effect.reported, *effect.coefficients)
-    return next((p.what for p in parameters if p.name == name and p.what), Verbatim(name))
+    unitless = re.sub("_(um|mm|arcsec|rad|ppm)$", "", name)  # its unit stands beside it
+    return next((p.what for p in parameters if p.name == name and p.what), Verbatim(unitless))
 
 
 def _figures(quantity: Quantity, factors: bool) -> Text:

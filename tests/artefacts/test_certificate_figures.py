@@ -122,10 +122,10 @@ def by_region(results: Results) -> list[Record]:
 
 
 def other_priors(results: Results) -> list[Record]:
-    """Those that change anything by a hundredth, and all together."""
+    """Those that change anything by a hundredth."""
     return [
         [{key: one[key] for key in ("times", "u_percent", "value_percent")}] for one in results["regions"]["priors"]
-        if one["family"] == "all" or max(abs(one["u_percent"]), abs(one["value_percent"])) >= 1
+        if max(abs(one["u_percent"]), abs(one["value_percent"])) >= 1
     ]  # fmt: skip
 
 
@@ -190,7 +190,7 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Error factors of the machine": parameters,
     "Where the error factors hold": by_region,
     "Sizes of errors, root mean square": lambda r: [[family] for family in r["regions"]["families"]],
-    "If this were different": other_priors,
+    "Influence of the priors": other_priors,
     "Differences that are determined": lambda r: [[one] for one in r["differences"]],
     "What to turn and what to enter": lambda r: [[one] for one in r["adjustments"]],
     "The six factors by the distance equations, a second way":
@@ -211,7 +211,7 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Plane figures": axis_figures,
     "Errors of axis X": curves_of("x"),
     "Errors of axis Y": curves_of("y"),
-    "Placings, as found from the readings": lambda r: [[placing] for placing in r["placings"]],
+    "Set-ups, as found from the readings": lambda r: [[placing] for placing in r["placings"]],
     "The plate's own geometry": ball_places,
     "Offset of the mount": offset,
     "Beside the integrations of the method's source": beside_integrations,

@@ -108,7 +108,7 @@ def test_normal_equations_square_the_condition_number() -> None:
 def test_poor_placings_are_refused_and_the_missing_ones_named(differences: Floats, problem: str, wanted: int) -> None:
     with pytest.raises(CmmUqError, match=problem) as refusal:
         solve_distances(differences, 400.0)
-    assert f"Add {wanted} placing" in str(refusal.value)
+    assert f"Add {wanted} set-up" in str(refusal.value)
     assert len(missing_placings(differences)) == wanted
 
 

@@ -139,7 +139,7 @@ def test_bows_of_the_guides_hide_behind_squareness_and_scale() -> None:
     ],
 )  # fmt: skip
 def test_a_missing_placing_is_named(measurement: int, wanted: str) -> None:
-    with pytest.raises(CmmUqError, match=f"Add a placing: .*{wanted}"):
+    with pytest.raises(CmmUqError, match=f"Add a set-up: .*{wanted}"):
         solve_equations(Triangle(FACTS, without(measurement)))
 
 

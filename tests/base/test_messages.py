@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import copy
 import datetime as dt
+import math
 import pickle
 import string
 from collections.abc import Collection
@@ -13,6 +14,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
+from cmm_uq.base.languages.translation import translated
 from cmm_uq.base.messages import (
     NOTHING,
     Day,
@@ -101,6 +103,21 @@ def test_a_number_and_a_day_are_printed_as_before() -> None:
     assert isinstance(signed(2.0, "g"), Number)
     assert day(dt.date(2004, 6, 1)) == "2004-06-01"
     assert isinstance(day(dt.date(2004, 6, 1)), Day)
+
+
+@pytest.mark.parametrize(("value", "spec", "shown"), [
+    (99.6, ".2g", "100"), (1170.0, ".3g", "1170"), (1e-5, ".1g", "1e-05"), (1.5e4, ".2e", "1.50e+04"), (-0.004, ".2f", "0.00"),
+    (-0.0, "g", "0"), (-0.01, "+.1f", "0.0"), (-math.inf, ".2f", "-inf"), (-10.0, ".0f", "-10"),
+])  # fmt: skip
+def test_no_power_of_ten_is_printed_where_digits_do_and_no_zero_is_negative(
+    value: float, spec: str, shown: str
+) -> None:
+    """In a table, and within a sentence of any language."""
+    assert number(value, spec) == signed(value, spec).replace("−", "-") == shown
+    within = Message(f"{{x:{spec}}}", {"x": value})
+    assert within == shown
+    assert translated(within, "de") == shown.replace(".", ",")
+    assert say("{x}", x=Verbatim("-0")) == "-0"
 
 
 def test_words_of_another_package_stay_a_message_or_stand_as_they_are() -> None:

@@ -111,7 +111,7 @@ def test_with_a_prior_the_decision_says_the_risks_of_all_machines() -> None:
     found = stated(prior=Prior(sd_um=2.0))
     assert found.risks is not None
     assert "Of all such machines, by the prior stated" in decision_block(found).explanation
-    assert "with nothing known of such machines" not in decision_block(found).explanation
+    assert "without prior knowledge of such machines" not in decision_block(found).explanation
 
 
 def test_values_of_one_length_have_no_picture() -> None:

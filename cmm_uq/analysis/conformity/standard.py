@@ -37,8 +37,8 @@ RAISED = say(
 )
 CMC = say("the laboratory's calibration and measurement capability")
 BY_MEASUREMENT_ALONE = say(
-    "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "
-    "near they may be off by several points either way."
+    "Probabilities rest on this measurement alone, without prior knowledge of such machines; near the limit they may be "
+    "several percentage points too high or too low."
 )
 
 

@@ -263,7 +263,7 @@ def clauses_in_words(
         how = Verbatim(given.differs.rstrip(". "))
         said.append(say("By the laboratory's copy this differs, {title}: {how}.", title=title, how=how))
     if unread := [one.title for one, given in each if given is None and not one.read]:
-        said.append(say("Clauses of {standard} that nobody has held against its text: {titles}.", standard=Verbatim(standard),
+        said.append(say("Clauses not checked against the text of {standard}: {titles}.", standard=Verbatim(standard),
                         titles=commas(unread)))  # fmt: skip
     lacking = (title for title, given in differing if not given.stricter)
     return said, tuple(say("{title} as the laboratory's copy has it", title=title) for title in lacking)

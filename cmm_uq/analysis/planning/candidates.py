@@ -43,7 +43,7 @@ class RelocatedCandidates:
 
     def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[SetUp, ...]:
         """A pattern in other places; first of all in the recorded attitude (3, 3)."""
-        ways = [(say("as recorded"), recorded), *self.attitudes(volume)]
+        ways = [(say("attitude as recorded"), recorded), *self.attitudes(volume)]
         return thinned(everywhere(volume, ways, pattern), count, volume)
 
 

@@ -138,7 +138,7 @@ def _time(points: Points, balls: bool) -> Iterator[Finding]:
     steps = np.abs(np.diff(time))[np.diff(points.group) == 0]
     usual = float(np.median(steps)) if len(steps) else 0.0
     if usual > LONGEST_PAUSE:
-        why = say("time_s: {usual:.3g} s from point to point of one placing is longer than anybody waits; it "
+        why = say("time_s: {usual:.3g} s from point to point of one set-up is longer than anybody waits; it "
                   "looks like milliseconds: divide by 1000", usual=usual)  # fmt: skip
     elif balls and 0 < usual < SHORTEST_BALL:
         why = say("time_s: {usual:.3g} s from ball to ball is shorter than a machine can probe one; it looks "
@@ -181,7 +181,7 @@ def _stuck(points: Points) -> Iterator[Finding]:
         if np.mean(outside != 0) >= _MOVING:
             rows = np.arange(firsts[start], [*firsts, len(values)][start + length])
             why = say(
-                "{column} is stuck at {values:g} in {at_lines}, where it changed from placing to placing "
+                "{column} is stuck at {values:g} in {at_lines}, where it changed from set-up to set-up "
                 "before or after: look at the sensor",
                 column=Verbatim(column),
                 values=values[rows[0]],
@@ -200,7 +200,7 @@ def _slipped(points: Points) -> Iterator[Finding]:
             continue
         if ways := [way for by, way in WAYS if _of_placings(np.roll(values, by), firsts, sizes)]:
             why = say(
-                "{column} changes inside every placing and would be the same for all points of each if it "
+                "{column} changes inside every set-up and would be the same for all points of each if it "
                 "were moved back: it is shifted {ways} by one row against the other columns: move it back",
                 column=Verbatim(column),
                 ways=alternatives(ways),

@@ -10,7 +10,7 @@ from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import POWER, SIZES
 from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
 from cmm_uq.app.commands.planning import RECORDED, MeasurementPlan
-from cmm_uq.base.messages import DASH, NOTHING, Message, Text, Verbatim, commas, listed, names, number, plural, say
+from cmm_uq.base.messages import DASH, NOTHING, Message, Text, Verbatim, after, commas, listed, number, plural, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import (
     Block,
@@ -30,6 +30,7 @@ from cmm_uq.certificate.wording import effect_title, stated_physics
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.inference.linear_model import Unknown
+from cmm_uq.maths.uncertainty.quantity import significant
 
 STATUS = {
     "determined": say("determined"),
@@ -82,7 +83,7 @@ def _families(titles: Sequence[Text]) -> list[Text]:
 
 def expected(parameter: Determination, u: float | None) -> Text:
     """An expected standard uncertainty, in the unit of :func:`unit_of`."""
-    return DASH if u is None else number(u / (MICROMETRE if parameter.unknown.unit == "mm" else 1.0), ".2g")
+    return DASH if u is None else significant(u / (MICROMETRE if parameter.unknown.unit == "mm" else 1.0))
 
 
 def unit_of(unknown: Unknown) -> Text:
@@ -126,7 +127,7 @@ def absorbed(found: Identifiability) -> list[Text]:
 
 
 def smallest(amplitude: float | None) -> Text:
-    return DASH if amplitude is None else number(amplitude, ".2g")
+    return DASH if amplitude is None else significant(amplitude)
 
 
 SHOWN = 6  # repeats in the table; results.json has all that are compared
@@ -159,7 +160,7 @@ def _size(size: float | None, source: Text) -> Text:
 
 _AVERAGED = say(
     "What is not known of the noise is averaged over its prior: no set-up offset with a probability of one half, "
-    "else about as large as the noise of a reading (half-Cauchy); u is the geometric mean. Better placings are "
+    "else about as large as the noise of a reading (half-Cauchy); u is the geometric mean. Better set-ups are "
     "searched for, and smallest effects predicted, with an offset as large as the noise of a reading. [plan] "
     "noise_from or placing_um would say it."
 )
@@ -172,17 +173,22 @@ def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
     rows = found.rows[:SHOWN]
     each = [Column(number(row.repeats)) for row in rows]
     cells: list[tuple[Text, ...]] = [
-        (say("Readings"), *(_pair(row.readings, row.readings_more, ".0f") for row in rows), NOTHING),
-        (say("Time"), *(_pair(row.minutes, row.minutes_more, ".0f") for row in rows), unit("min")),
+        (say("Readings"), *(_pair(number(row.readings), number(row.readings_more, ".0f")) for row in rows), NOTHING),
+        (
+            say("Time"),
+            *(_pair(number(row.minutes, ".0f"), number(row.minutes_more, ".0f")) for row in rows),
+            unit("min"),
+        ),
     ]
     for i, unknown in enumerate(found.unknowns):
         size = MICROMETRE if unknown.unit == "mm" else 1.0
         figures = (
-            _pair(row.u[i] / size, row.u_more[i] / size, ".2g") if np.isfinite(row.u[i]) else DASH for row in rows
+            _pair(significant(row.u[i] / size), significant(row.u_more[i] / size)) if np.isfinite(row.u[i]) else DASH
+            for row in rows
         )
         cells.append((named(unknown), *figures, unit_of(unknown)))
     note = say(
-        "Expected u of each parameter with the {count} placings of the plan; in brackets with one more, which tells as "
+        "Expected u of each parameter with the {count} set-ups of the plan; in brackets with one more, which tells as "
         "much as they do on average. An offset of a set-up is shared by its repeats.",
         count=found.placings,
     )
@@ -190,39 +196,34 @@ def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
     if enough is None:
         advice = say(
             "Up to {most} repeats, a minute of one more repeat lowers at least one expected uncertainty more than a minute "
-            "of one more placing. The plan has {repeats}.", most=most - 1, repeats=repeats,
-        )  # fmt: skip
-    elif repeats > enough:
-        advice = say(
-            "With {enough} or more repeats, a minute of one more placing lowers every expected uncertainty more than a minute "
-            "of one more repeat. The plan has {repeats}: fewer repeats and more placings would tell more in the same time.",
-            enough=enough, repeats=repeats,
+            "of one more set-up. The plan has {repeats}.", most=most - 1, repeats=repeats,
         )  # fmt: skip
     else:
         advice = say(
-            "With {enough} or more repeats, a minute of one more placing lowers every expected uncertainty more than a minute "
+            "With {enough} or more repeats, a minute of one more set-up lowers every expected uncertainty more than a minute "
             "of one more repeat. The plan has {repeats}.",
             enough=enough, repeats=repeats,
         )  # fmt: skip
+    fewer = say("Fewer repeats and more set-ups would tell more in the same time.")
     return Table(
-        say("Repeats and placings"), columns((say("Repeats of every point"), *each, say("Unit"))), tuple(cells), (note,)
-    ), Paragraph(advice)
+        say("Repeats and set-ups"), columns((say("Repeats of every point"), *each, say("Unit"))), tuple(cells), (note,)
+    ), Paragraph(after(advice, fewer if enough is not None and repeats > enough else NOTHING))
 
 
-def _pair(one: float, other: float, form: str) -> Text:
-    return say("{one} ({other})", one=number(one, form), other=number(other, form))
+def _pair(one: Text, other: Text) -> Text:
+    return say("{one} ({other})", one=one, other=other)
 
 
 def plan_document(plan: MeasurementPlan) -> Document:
     facts, findings = plan.job.facts, plan.outlook.identifiability
     artefact = Verbatim(facts.artefact.name or facts.artefact.kind.replace("_", " "))
     count = len(plan.start.placings)
-    recording = say("the recording ({count} placings)", count=count)
-    start = recording if plan.name == RECORDED else say("{name} ({count} placings)", name=plan.name, count=count)
+    recording = say("the recording ({count} set-ups)", count=count)
+    start = recording if plan.name == RECORDED else say("{name} ({count} set-ups)", name=plan.name, count=count)
     warnings: list[Text] = [say("Not met: {what}.", what=each.what) for each in plan.conditions if not each.met]
     if findings is not None and not findings.complete:
         free = commas(named(p.unknown) for p in findings.parameters if p.status == "free")
-        warnings.append(say("Not determined by these placings: {free}.", free=free))
+        warnings.append(say("Not determined by these set-ups: {free}.", free=free))
     marks = ((Verbatim("✓" if each.met else "✗"), each.what) for each in plan.conditions)
     conditions = (Paragraph(say("{mark} {what}", mark=mark, what=what)) for mark, what in marks)
     pictures = placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first)
@@ -231,7 +232,7 @@ def plan_document(plan: MeasurementPlan) -> Document:
         particulars=(
             Facts((
                 (say("Machine"), Verbatim(facts.machine.name)), (say("Artefact"), artefact),
-                (say("Effects to determine"), (commas(names(facts.model.effects)) or say("the error of one axis"))),
+                (say("Effects to determine"), commas(map(effect_title, facts.model.effects)) or say("the error of one axis")),
                 *stated_physics(),
             )),
             Facts((
@@ -240,9 +241,9 @@ def plan_document(plan: MeasurementPlan) -> Document:
         ),
         warnings=warnings,
         sections=(
-            section(say("Placings"), _placings(plan)), section(say("Pictures of the placings"), *pictures),
-            section(say("What these placings determine"), *_determined(plan)),
-            section(say("Repeats or placings"), *worth(plan)),
+            section(say("Set-ups"), _placings(plan)), section(say("Pictures of the set-ups"), *pictures),
+            section(say("What these set-ups determine"), *_determined(plan)),
+            section(say("Repeats or set-ups"), *worth(plan)),
             section(say("What a better plan gains"), *_gain(plan)),
             section(say("Smallest effects that the diagnosis would find"), _smallest(plan)),
             section(say("Conditions of the standard"), *conditions),
@@ -256,9 +257,9 @@ def to_measure_words(plan: MeasurementPlan) -> Text:
     """How many placings are still to be measured, and how long that takes."""
     count, total = len(plan.to_measure), sum(plan.minutes)
     if not count:
-        return say("nothing more: the placings are recorded")
-    one = say("{count} placing, about {total:.0f} min", count=count, total=total)
-    return plural(count, one=one, many=say("{count} placings, about {total:.0f} min", count=count, total=total))
+        return say("nothing more: the set-ups are recorded")
+    one = say("{count} set-up, about {total:.0f} min", count=count, total=total)
+    return plural(count, one=one, many=say("{count} set-ups, about {total:.0f} min", count=count, total=total))
 
 
 def placing_rows(plan: MeasurementPlan) -> list[tuple[Text, ...]]:
@@ -277,7 +278,7 @@ def _placings(plan: MeasurementPlan) -> Table | None:
     notes = [say("Every point {repeats} times; points count repeats.", repeats=plan.setting.plan.repeats)]
     if plan.measured:
         notes.append(say("{measured} measurements are recorded already.", measured=plan.measured))
-    return table(say("Placings in the order of measurement"), heads, placing_rows(plan), *notes)
+    return table(say("Set-ups in the order of measurement"), heads, placing_rows(plan), *notes)
 
 
 def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
@@ -287,7 +288,7 @@ def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
         return tuple(blocks)
     heads = (
         say("Parameter"), Column(say("Expected u")), Column(say("Under white noise")), say("Unit"),
-        Column(say("Allowed by physics")), NOTHING,
+        Column(say("Allowed by physics")), say("Status"),
     )  # fmt: skip
     rows = tuple(
         (named(p.unknown), expected(p, p.u), expected(p, p.u_white), unit_of(p.unknown),
@@ -321,7 +322,7 @@ def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
         return ()
     both = (say("the recording") if plan.name == RECORDED else plan.name, say("the better plan"))
     text = say(
-        "Searched for: {criteria}, by greedy choice and exchange. {before} placings before, {better} in the better plan, "
+        "Searched for: {criteria}, by greedy choice and exchange. {before} set-ups before, {better} in the better plan, "
         "{kept} of them kept. Pairs that could not be told apart: {alike_before} before, {alike_after} after; effects of "
         "which nothing shows, or that pass for named ones: {hidden_before} before, {hidden_after} after.",
         criteria=CRITERIA[criterion], before=len(plan.start.placings), better=len(plan.better.placings), kept=plan.kept,
@@ -358,13 +359,10 @@ def _beside(
 
 
 def _smallest(plan: MeasurementPlan) -> Table | None:
-    heads = (
-        say("Effect not in the job's model"), say("Parameter"), Column(say("Detected from")),
-        Column(say("Named rightly from")), say("Unit"),
-    )  # fmt: skip
+    figures = Column(say("Detected from")), Column(say("Named rightly from"))
+    heads = (say("Effect not in the job's model"), *figures, say("Unit"))
     rows = (
-        (effect_title(p.effect), Verbatim(p.parameter), smallest(p.detectable), smallest(p.identifiable), p.unit)
-        for p in plan.outlook.powers
+        (effect_title(p.effect), smallest(p.detectable), smallest(p.identifiable), p.unit) for p in plan.outlook.powers
     )
     notes: list[Text] = [say(
         "Size found in {power:.0f} of 100 recordings, at {false_alarms:g} % of false alarms. Named "
@@ -375,7 +373,7 @@ def _smallest(plan: MeasurementPlan) -> Table | None:
     )]  # fmt: skip
     if plan.setting.plan.repeats > 1:
         notes.append(say(
-            "With repeats, what changes from placing to placing looks in part like set-up offsets: such an effect may have to "
+            "With repeats, what changes from set-up to set-up looks in part like set-up offsets: such an effect may have to "
             "be larger than is said here."
         ))  # fmt: skip
     return table(say("Smallest effects"), heads, rows, *notes)

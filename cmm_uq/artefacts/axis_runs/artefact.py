@@ -105,8 +105,8 @@ class AxisRuns(Artefact):
         if spans:
             span, stated = float(max(spans)), facts.u_scale_um_per_m
             sd = np.inf if stated is None else MICROMETRE * stated * span / METRE
-            title, what = say("Longest displacement by the instrument"), say("longest displacement")
-            self._length = (Size("length_mm", title, unit("mm"), span, sd, what),)
+            title = say("Longest displacement by the instrument")
+            self._length = (Size("length_mm", title, unit("mm"), span, sd, title),)
         further = list(self._references(square, edge, where))
         self.exact = tuple(self._taken_as_exact(edge))
         self._shapes = -np.column_stack([shape for _, shape in further]) if further else np.zeros((len(own), 0))

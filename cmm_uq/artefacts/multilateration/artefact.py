@@ -106,7 +106,7 @@ class Multilateration(Artefact):
         longest, stated = float(self.distances.max()), facts.u_scale_um_per_m
         sd = np.inf if stated is None else MICROMETRE * stated * longest / METRE
         title = say("Longest distance by the interferometer")
-        self.sizes = (Size("length_mm", title, unit("mm"), longest, sd, say("longest distance")),)
+        self.sizes = (Size("length_mm", title, unit("mm"), longest, sd, title),)
 
     @property
     def set_up(self) -> Text:

@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Column, Table, figure_columns, text_columns
+from cmm_uq.certificate.document import Column, Table, figure_columns
 from cmm_uq.certificate.wording import numbered
 from cmm_uq.machine.model.recorded import columns_needed, place
 from cmm_uq.machine.physics.effects.probing import attitudes
@@ -132,11 +132,8 @@ def ball_table(balls: Sequence[ScannedBall], form_um: float) -> Table:
         places = (*(signed(value, ".4f") for value in one.sphere.centre), number(one.sphere.radius, ".4f"))
         figures = (signed(value, ".1f") for value in one.figures_um.values())
         rows.append((*name, *places, *figures, number(one.view_deg, ".0f"), number(one.seen_deg, ".0f")))
-    heads = (
-        *text_columns(say("Position")),
-        Column(say("Ball")),
-        *(Column(Verbatim(axis), unit("mm")) for axis in AXES),
-    )
+    coordinates = (Column(Verbatim(axis), unit("mm")) for axis in AXES)
+    heads = (Column(say("Position"), numeric=False), Column(say("Ball")), *coordinates)
     of_form = figure_columns(say("u by form"), say("Shift"), unit=unit("µm")) if form_um else ()
     scatter = figure_columns(say("u"), say("Rms"), say("Form"), unit=unit("µm"))
     angles = figure_columns(say("View"), say("Seen"), unit=unit("°"))

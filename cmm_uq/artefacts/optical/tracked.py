@@ -42,7 +42,7 @@ class TrackedPoints(Plate):
 
     kind = "tracked_points"
     title = say("Reference instrument")
-    size_title = say("Longest distance by the reference instrument")
+    size_title = size_what = say("Longest distance by the reference instrument")
     plural = "the points as the machine has them"
     mend = "Check which row has which reference, and of an arm its rows, convention and reversed"
 

@@ -79,7 +79,7 @@ class ShiftedArtefact(Artefact):
 
     @property
     def set_up(self) -> Text:
-        return say("Placing of the artefact")
+        return say("Set-up of the artefact")
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         placed = true_xyz.copy()

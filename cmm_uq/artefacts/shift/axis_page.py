@@ -139,9 +139,9 @@ def _residuals(result: ShiftResult) -> Section:
         expanded_before_um=k * result.repeatability.value * series.noise_scale, reference=say("the artefact's point"),
         position_label=say("Point of the artefact"), before_label=say("Without a curve"),
         after_label=say("With the curve"),
-        caption=say("What the placings disagree by, without and with the curve, and U (k = {k}).", k=number(k, ".2f")),
+        caption=say("What the set-ups disagree by, without and with the curve, and U (k = {k}).", k=number(k, ".2f")),
         alternative=say(
-            "The placings disagree by {before:.2f} µm rms without and {after:.2f} µm with the curve.",
+            "The set-ups disagree by {before:.2f} µm rms without and {after:.2f} µm with the curve.",
             before=without, after=with_curve,
         ),
     )  # fmt: skip
@@ -198,9 +198,7 @@ def warnings(result: ShiftResult) -> list[Text]:
 def measured(result: ShiftResult) -> Text:
     name, axis, series = Verbatim(result.job.facts.machine.name), Verbatim(result.axis), result.estimate.series
     n, s = len(series.numbers), len(series.shifts)
-    return say(
-        "{name}, axis {axis}, {points} points in {placings} placings", name=name, axis=axis, points=n, placings=s
-    )
+    return say("{name}, axis {axis}, {points} points in {placings} set-ups", name=name, axis=axis, points=n, placings=s)
 
 
 def quantities(result: ShiftResult) -> list[Left]:
@@ -223,8 +221,8 @@ def _open(result: ShiftResult) -> Section:
     free, title = result.undetermined, say("What the shifts leave open")
     period = say(
         "Every shift is a multiple of {period} mm, so an error of that period, or of a half, a "
-        "third of it, is the same in all placings and shows in no reading: it looks like another "
-        "artefact. A placing shifted by another length, such as {other} mm, would show it.",
+        "third of it, is the same in all set-ups and shows in no reading: it looks like another "
+        "artefact. A set-up shifted by another length, such as {other} mm, would show it.",
         period=nominal(free.period),
         other=figure(0.618 * free.period, 3),
     )
@@ -235,13 +233,13 @@ def _open(result: ShiftResult) -> Section:
     one = say(
         "Beyond a constant and a slope, {count} combination of the errors at the positions "
         "read change no reading. The curve shows the smoothest error that agrees with the readings. "
-        "A placing that joins the positions, or a finer pitch, would determine them.",
+        "A set-up that joins the positions, or a finer pitch, would determine them.",
         count=count,
     )
     many = say(
         "Beyond a constant and a slope, {count} combinations of the errors at the positions "
         "read change no reading. The curve shows the smoothest error that agrees with the readings. "
-        "A placing that joins the positions, or a finer pitch, would determine them.",
+        "A set-up that joins the positions, or a finer pitch, would determine them.",
         count=count,
     )
     plot = curve_with_band(

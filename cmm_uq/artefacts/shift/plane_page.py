@@ -58,7 +58,7 @@ EVERY = 4  # every so many of the positions stand in the table of a curve
 
 def _picture(result: PlaneShiftResult, printed: PrintedCurve) -> Plot:
     words, error, band = title(printed.name), printed.curve.error / printed.size, printed.curve.band / printed.size
-    free = say("These placings do not determine it.") if printed.name in result.estimate.free.names else NOTHING
+    free = say("These set-ups do not determine it.") if printed.name in result.estimate.free.names else NOTHING
     caption = say("{words:capital}, with the band that holds the whole curve with 95 % probability.", words=words)
     return curve_with_band(
         printed.curve.position, error, band, x_label=say("Scale reading {axis} / mm", axis=Verbatim(printed.axis)),
@@ -105,9 +105,9 @@ def _residuals(result: PlaneShiftResult) -> Section:
     first, second = (say("{plane} / mm", plane=Verbatim(axis)) for axis in plate.plane)
     plot = vector_plot(
         plate.flat, [(say("Without curves"), before), (say("With the curves"), after)], axis_labels=(first, second),
-        caption=say("What the placings disagree by, with scales and squareness alone, and with the curves."),
+        caption=say("What the set-ups disagree by, with scales and squareness alone, and with the curves."),
         alternative=say(
-            "The placings disagree by {before:.2f} µm rms without and {after:.2f} µm with the curves.",
+            "The set-ups disagree by {before:.2f} µm rms without and {after:.2f} µm with the curves.",
             before=without, after=with_curves,
         ),
     )  # fmt: skip
@@ -132,7 +132,7 @@ def warnings(result: PlaneShiftResult) -> list[Text]:
         together.append(words)
     if together:
         undetermined = say(
-            "Not determined by these placings: {names}. Curves of these names rest on the assumption that "
+            "Not determined by these set-ups: {names}. Curves of these names rest on the assumption that "
             "they are small and smooth.",
             names=listed(together),
         )
@@ -144,7 +144,7 @@ def measured(result: PlaneShiftResult) -> Text:
     name, plate = Verbatim(result.job.facts.machine.name), result.estimate.plate
     plane, p, s = Verbatim(plate.plane), len(plate.numbers), len(plate.placings)
     return say(
-        "{name}, plane {plane}, {balls} balls in {placings} placings", name=name, plane=plane, balls=p, placings=s
+        "{name}, plane {plane}, {balls} balls in {placings} set-ups", name=name, plane=plane, balls=p, placings=s
     )
 
 
@@ -193,11 +193,11 @@ def _open(result: PlaneShiftResult) -> Section:
         many = say("{words:capital} can change together without changing any reading.", words=words)
         texts.append(plural(len(combination), one=one, many=many))
     shears = say(
-        "A plate that is only shifted shears and stretches as the machine does: a placing turned by 90° parts them."
+        "A plate that is only shifted shears and stretches as the machine does: a set-up turned by 90° parts them."
     )
     size = say("The common scale of both axes needs one known length between two balls.")
     bends = say(
-        "An axis that bends as it turns looks like a placing that is turned: shift along the other "
+        "An axis that bends as it turns looks like a set-up that is turned: shift along the other "
         "axis too, or turn the plate by 180°."
     )
     for known, what in ((SQUARENESS, shears), (SCALE, size), (STRAIGHTNESS, bends)):
@@ -209,7 +209,7 @@ def _open(result: PlaneShiftResult) -> Section:
     ]
     if periods:
         same = say(
-            "Errors of a period of {periods} are the same in all placings and show in none.", periods=listed(periods)
+            "Errors of a period of {periods} are the same in all set-ups and show in none.", periods=listed(periods)
         )
         texts.append(same)
     if not texts:
@@ -217,7 +217,7 @@ def _open(result: PlaneShiftResult) -> Section:
             say("Scales, squareness, and the bows of linearity, straightness and rotation are all determined.")
         )
     texts.append(say("Details shorter than a quarter of what was read of an axis are taken as noise."))
-    return Section(say("What the placings leave open"), (Paragraph(messages.sentences(texts)),))
+    return Section(say("What the set-ups leave open"), (Paragraph(messages.sentences(texts)),))
 
 
 def _placings(result: PlaneShiftResult) -> Section:
@@ -230,10 +230,10 @@ def _placings(result: PlaneShiftResult) -> Section:
     )
     middles = (say("Middle {plane}", plane=Verbatim(axis)) for axis in plate.plane)
     columns = (
-        *figure_columns(say("Placing")), Column(say("Turned"), unit("°")), *figure_columns(*middles, unit=unit("mm")),
+        *figure_columns(say("Set-up")), Column(say("Turned"), unit("°")), *figure_columns(*middles, unit=unit("mm")),
         Column(say("Balls")),
     )  # fmt: skip
-    return Section(say("Placings"), (Table(say("Placings, as found from the readings"), columns, rows),))
+    return Section(say("Set-ups"), (Table(say("Set-ups, as found from the readings"), columns, rows),))
 
 
 def _plate(result: PlaneShiftResult) -> Section:
@@ -246,7 +246,7 @@ def _plate(result: PlaneShiftResult) -> Section:
         )
         places = figure_columns(say("First"), say("U"), say("Second"), say("U"), unit=unit("mm"))
         note: Text = say(
-            "From the first ball, along the axes as the plate lay in the first placing. U, for a coverage probability of "
+            "From the first ball, along the axes as the plate lay in the first set-up. U, for a coverage probability of "
             "95 %, is of the best fit of all balls."
         )
         if not free.determines(SCALE):
@@ -261,7 +261,7 @@ def _coordinate(x: float, U: float) -> tuple[Text, Text]:
 
 def _method(result: PlaneShiftResult) -> Section:
     text = say(
-        "The errors of both axes, the positions of the balls and all placings are fitted to all readings at once. Linearity, "
+        "The errors of both axes, the positions of the balls and all set-ups are fitted to all readings at once. Linearity, "
         "straightness and rotation are smooth functions (Gaussian processes, Matérn 7/2) whose sizes, correlation length and "
         "growth towards the ends are sampled; all else is drawn from its exact conditional distribution."
     )

@@ -330,7 +330,7 @@ def curve_data(curve: Curve, expanded: Floats, unit: float = MICROMETRE, suffix:
 def figures_section(caption: Text, named: Sequence[Left], meaning: Text) -> Section:
     u = say("U is the expanded uncertainty for a coverage probability of 95 %, from the posterior distribution.")
     rows = [(name, quantity) for _, _, name, quantity in named]
-    return Section(say("Figures of performance"), (stated_table(caption, rows, (SIGN, meaning, u)),))
+    return Section(say("Figures of performance"), (stated_table(caption, rows, (SIGN, meaning, u)),), first=True)
 
 
 def artefact_section(

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self, get_args
 
-from cmm_uq.base.messages import Argument, Day, Message, Number, PatternFormatter, Plural, Text, fields_of
+from cmm_uq.base.messages import Argument, Day, Message, Number, PatternFormatter, Plural, Text, fields_of, printed
 
 Code = Literal["en", "de", "fr", "ja"]  # of a language, by BCP 47
 ENGLISH: Code = "en"  # what every text is written in; no catalogue is read for it
@@ -199,7 +199,7 @@ class _Localised(PatternFormatter):
 
     def format_field(self, value: Any, format_spec: str) -> str:
         if not isinstance(value, str):
-            return self.language.number(format(value, format_spec))
+            return self.language.number(printed(value, format_spec))
         if format_spec in ("capital", "small") and not self.language.cases:
             return str.__str__(value)
         return super().format_field(value, format_spec)

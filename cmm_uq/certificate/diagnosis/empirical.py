@@ -110,9 +110,9 @@ def empirical_section(d: Diagnosis, improved: Callable[[Improvement], Table]) ->
     rows += [(say("It could as well be"), alternatives(one.also)) for one in found.functions if one.also]
     if stated_functions(d):
         use = say(
-            "Results.json states it as an effect of the laboratory's own, and a diagnosis writes it to {file}: in job.toml, "
-            "and named in [model] effects, it is estimated anew, corrected, and part of every uncertainty. Its form is "
-            "then held.",
+            "It is stated in results.json as an effect of the laboratory's own, and a diagnosis writes it to {file}: in "
+            "job.toml, and named in [model] effects, it is estimated anew, corrected, and part of every uncertainty. Its form "
+            "is then held.",
             file=Verbatim(EMPIRICAL),
         )
         rows.append((say("To use it"), use))

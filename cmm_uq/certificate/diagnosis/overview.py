@@ -187,7 +187,7 @@ def _to_do(result: JobDiagnosis) -> Text:
         return lines(mend)
     misfit, acting = d.verdict in ("partial", "unexplained"), d.verdict in ("empirical", "unexplained")
     nearest = empirical.nearest_words(d) if acting else NOTHING
-    first = say("First measure the set-ups that are told below, to part what this recording cannot.")
+    first = say("First measure the set-ups listed below, to tell apart what this recording cannot.")
     return lines(dict.fromkeys((
         *([first] if further and not d.agrees else []),
         *(line for item in d.effects for line in _look_at(d, item)),
@@ -200,7 +200,7 @@ def _to_do(result: JobDiagnosis) -> Text:
              say("Place the artefact anew in the same set-ups and measure again: what stays is the machine's.")),
             (d.agrees and result.findings, say("Nothing on account of the machine; see the warnings on the recording.")),
             (d.agrees and not result.findings, say("Nothing on account of this recording.")),
-            (d.agrees and further, say("To see what it could not have shown, measure the set-ups that are told below.")),
+            (d.agrees and further, say("To see what it could not have shown, measure the set-ups listed below.")),
         ),
     )))  # fmt: skip
 

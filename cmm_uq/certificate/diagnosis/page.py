@@ -242,7 +242,7 @@ def _rivals(d: Diagnosis) -> doc.Table:
     )
     heads = doc.columns((say("Explanation"), doc.Column(say("Probability"))))
     rows = tuple((wording.effect_title(name), wording.probability(p)) for name, p in d.rivals)
-    notes = messages.holding((True, say("Nothing missing has the rest.")), (some < every, drawn))
+    notes = messages.holding((True, say("The rest is the probability that nothing is missing.")), (some < every, drawn))
     return doc.Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
 
 

@@ -80,7 +80,7 @@ def _what(result: JobDiagnosis, plan: NextPlan) -> Text:
     times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
     count = plural(len(plan.placings), one=say("one set-up"), many=say("{count} set-ups", count=len(plan.placings)))
     what = say(
-        "{count:capital} more of the {artefact:small}, each measured {times}, added to this recording.", count=count,
+        "{count:capital} more of the {artefact:small}, measured {times} each, added to this recording.", count=count,
         artefact=result.diagnosis.before.artefact.title, times=times,
     )  # fmt: skip
     if plan.reached:
@@ -202,14 +202,14 @@ def unseen_section(result: JobDiagnosis) -> Section:
         if row.common or not row.shown
     ]
     heads = (
-        say("Error"), Column(say("Found from")), Column(say("Named from")), Column(say("Reckoned with up to")),
+        say("Error"), Column(say("Found from")), Column(say("Named from")), Column(say("Considered up to")),
         say("Why, and for which periods"),
     )  # fmt: skip
     beside = without_power(result) if rows else NOTHING
     smallest = table(say("Smallest errors that would have shown"), heads, rows, say(
         "With the noise that was found and beside what was asserted, an error of this size would have been found, or "
         "called by its right name, in {power:.0f} of 100 such recordings; “not found” where even the largest error "
-        "reckoned with would not. In closed form: mostly within 15 %, a name with a close rival within a factor of two.",
+        "considered would not. In closed form: mostly within 15 %, a name with a close rival within a factor of two.",
         power=100 * POWER,
     ))  # fmt: skip
     warned = Paragraph(beside, tone="warning") if beside else None
@@ -243,9 +243,10 @@ def _taker(name: str) -> Text:
 
 
 def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
-    every_one = say("{low:.3g} to {high:.3g}\u00a0{unit}", low=periods.low, high=periods.high, unit=periods.unit)
+    of = say("of the travel") if periods.unit == "1" else periods.unit
+    every_one = say("{low:.3g} to {high:.3g}\u00a0{unit}", low=periods.low, high=periods.high, unit=of)
     if periods.worst is None:
-        return say("none of {every_one} resolved by these positions", every_one=every_one)
+        return say("these positions tell apart none of {every_one}", every_one=every_one)
     worst = say("{every_one}, at worst {size}", every_one=every_one, size=_size(periods.worst, row.unit))
     if not periods.unresolved:
         return worst
@@ -255,9 +256,7 @@ def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
     ]
     if len(ranges) > _RANGES:
         ranges = [*ranges[:_RANGES], say("{more} more ranges", more=len(ranges) - _RANGES)]
-    return say(
-        "{worst}; not resolved: {ranges}\u00a0{unit}", worst=worst, ranges=messages.listed(ranges), unit=periods.unit
-    )
+    return say("{worst}; not resolved: {ranges}\u00a0{unit}", worst=worst, ranges=messages.listed(ranges), unit=of)
 
 
 _READINGS = frozenset(f"{a}_mm" for a in AXES)

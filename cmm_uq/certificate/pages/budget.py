@@ -56,9 +56,10 @@ def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block,
     return (*blocks, Paragraph(statement(evaluation, output)))
 
 
-def budget_blocks(measurand: Text, budget: Budget) -> list[Block]:
+def budget_blocks(measurand: Text, budget: Budget, *notes: Text) -> list[Block]:
     """A budget as a table, and as a picture when it has more than one line."""
-    table = Table(say("Contributions to {measurand}", measurand=measurand), _columns(HEADINGS), tuple(budget.as_text()))
+    caption = say("Contributions to {measurand}", measurand=measurand)
+    table = Table(caption, _columns(HEADINGS), tuple(budget.as_text()), notes)
     shares = [(line.name, share) for depth, line, share in budget.flat() if depth == 0 and share]
     if len(shares) < 2:
         return [table]

@@ -29,6 +29,7 @@ from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, cr
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
 from cmm_uq.certificate.sections.regions import (
+    UNMOVED,
     changes_table,
     readings_table,
     recording_words,
@@ -172,7 +173,7 @@ def unseen_section(found: PartMeasurement) -> Section:
     )
     return section(
         title, Paragraph(unseen_words(found), "warning"),
-        table(say("Errors that are drawn as large as they may be"), heads, rows, known), *map(Paragraph, planned),
+        table(say("Errors that the calibration leaves open"), heads, rows, known), *map(Paragraph, planned),
     )  # fmt: skip
 
 
@@ -254,9 +255,7 @@ def resting_on_priors(found: PartMeasurement) -> list[str]:
 
 def priors_words(found: PartMeasurement) -> Text:
     if not (names := resting_on_priors(found)):
-        return say(
-            "Where priors of the machine's errors are half as wide, or twice, no figure changes by a tenth of U."
-        )
+        return UNMOVED
     return say(
         "{count} of {all} characteristics rest on what was taken for the machine's errors before its recording: their value "
         "or U changes by a tenth of U or more where a prior is half as wide, or twice.",

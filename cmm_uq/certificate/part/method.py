@@ -341,6 +341,7 @@ def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ..
     """Machine, number, issuer, date with its age, validity of the certificate."""
     serial = say("serial number {serial}", serial=Verbatim(standing.serial)) if standing.serial else NOTHING
     number_of: Text = Verbatim(standing.number)
+    named = say("Calibration of the machine") if standing.source == "job" else say("Certificate of the machine")
     if standing.draft:
         number_of = say("{number}, a draft", number=number_of)
     days, date = standing.age.days, messages.day(standing.date)
@@ -349,7 +350,7 @@ def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ..
     calibrated = say("{date}, {age} before", date=date, age=age) if days else on_the_day
     return (
         (say("Machine"), commas(text for text in (Verbatim(standing.machine), serial) if text)),
-        (say("Certificate of the machine"), number_of),
+        (named, number_of),
         (say("Issued by"), Verbatim(standing.laboratory)),
         (say("Calibrated on"), calibrated),
         (say("Valid until"), messages.day(standing.valid_until) if standing.valid_until else NOTHING),

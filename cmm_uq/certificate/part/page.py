@@ -213,8 +213,9 @@ def _table(every: Sequence[CharacteristicFigures], *, measured: bool, reported: 
         (any(one.one_sided for one in every) and not reported, say(
             "A measured form, orientation or location has one side and is stated by its interval, which is never below "
             "zero and as likely to hold a small width as a large one (Feldman and Cousins, 1998); its value is the median.")),
-        (True, say("All other values are stated less the mean of their errors.") if every[0].stated.value is not None else
-         say("The interval is that of the true value less the indicated one.")),
+        (True, say("The interval is that of the true value less the indicated one.") if every[0].stated.value is None else
+         say("All other values are corrected by the mean of their errors.") if any(one.one_sided for one in every) else
+         say("The values are corrected by the mean of their errors.")),
     )  # fmt: skip
     return table(say("Angles") if every[0].angular else say("Lengths, forms and places"), heads, rows, *notes)
 

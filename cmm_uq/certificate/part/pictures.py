@@ -173,7 +173,7 @@ def part_picture(plan: Plan, pose: PartPose, names: Sequence[Text]) -> Plot:
     caption = told(
         after(
             say("The part as it is probed, {count}: dots are points with their normals.", count=count),
-            say("Brown lines are styli.") if np.any(tips != roots) else NOTHING,
+            say("Thick lines are styli.") if np.any(tips != roots) else NOTHING,
         ),
         len(rows),
         len(points),

@@ -349,7 +349,7 @@ def tolerance_plot(
             ax.annotate(f"{value[row]:+.1f}".replace("-", "−"), (side * reach, row), (-6 * side, 4),
                         textcoords="offset points", ha="right" if side > 0 else "left", color=MUTED)  # fmt: skip
         style.named_rows(ax, rows, names)
-        label = say("Parameter over its tolerance (band: inside; cross: outside beyond doubt)")
+        label = say("Parameter over its tolerance (band: inside; cross: outside)")
         ax.set(xlim=(-1.02 * reach, 1.02 * reach), xlabel=label)
         return style.drawn(figure, caption, alternative, "tolerances")
 

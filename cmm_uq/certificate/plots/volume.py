@@ -280,9 +280,9 @@ def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
             for line, below in zip(lines, (4.5,) if len(lines) == 1 else (3.6, 6.4), strict=True):
                 figure.text(left + 0.035, 1 - below / height, line, fontsize=size, color=INK, fontweight="bold")
             figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
-        last, numbers = first + len(placings) - 1, say("Placing {first}", first=first)
+        last, numbers = first + len(placings) - 1, say("Set-up {first}", first=first)
         if last > first:
-            numbers = say("Placings {first} to {last}", first=first, last=last)
+            numbers = say("Set-ups {first} to {last}", first=first, last=last)
         told = say(
             "{numbers}: scale readings in mm; ○ is the first point, dashed lines drop to the table.", numbers=numbers
         )

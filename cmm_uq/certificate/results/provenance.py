@@ -100,7 +100,7 @@ def _kernels() -> str:
 
 
 FILE = "provenance.json"
-REBUILT = say("{file}, whose environment, installed again, computes all of this again", file=Verbatim(FILE))
+REBUILT = say("{file} (names the software environment that computes all of this again)", file=Verbatim(FILE))
 PLATFORM, ENVIRONMENT = "cmm-uq:platform", "cmm-uq:environment"
 _PREFIX = "urn:cmm-uq:"
 _RECORDING, _REPORT, _PROGRAM, _LABORATORY = "cmm-uq:recording", "cmm-uq:report", "cmm-uq:program", "cmm-uq:laboratory"

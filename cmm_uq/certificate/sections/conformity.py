@@ -92,8 +92,8 @@ def without_noise(statement: Statement, machine: MachinePerformance | None) -> l
     """How large of the machine alone is what was decided, with noise, as recorded."""
     found = None if machine is None else machine.of_statement(statement)
     return [] if found is None else [say(
-        "Decided is what was recorded, noise included, {recorded} µm at most; of the machine without noise this is {interval} "
-        "µm (95 % interval).", recorded=rounded(found[0], found[1].expanded)[0], interval=interval_of(found[1]),
+        "The largest recorded value, noise included, is {recorded} µm; that of the machine alone is {interval} µm (95 % "
+        "interval).", recorded=rounded(found[0], found[1].expanded)[0], interval=interval_of(found[1]),
     )]  # fmt: skip
 
 
@@ -254,7 +254,7 @@ def performance(result: Result) -> Section:
     title, own, regions = say("Figures of performance"), own_figures(result), result.regions
     if not result.accuracy:
         return section(title)
-    machine = (say("Without noise from"), say("to")) if own else ()
+    machine = (say("Machine alone from"), say("to")) if own else ()
     figures = (say("Value"), say("U"), say("k"), *machine)
     heads: tuple[Text | Column, ...] = (say("Quantity"), *map(Column, figures), say("Unit"))
     rows = []
@@ -279,8 +279,8 @@ def performance(result: Result) -> Section:
             "and would be: {figures}.", figures=would,
         ))  # fmt: skip
     if own:
-        notes.append(say("Without noise: the 95 % interval of the same figure of the machine alone, by all of its errors "
-                         "together; nothing is decided by it."))  # fmt: skip
+        notes.append(say("Machine alone: 95 % interval of the figure by all errors of the machine, without noise and errors "
+                         "of artefact or reading; it decides nothing."))  # fmt: skip
     elif not isinstance(regions, FactorRegions) and regions:
         notes.append(say("What of them is the machine's alone, without noise, is not stated: {why}.", why=regions))
     notes += wording.skewed_note(result.accuracy.values())

@@ -80,14 +80,13 @@ def posterior_section(result: Result) -> Section:
 def method(result: Result) -> Section:
     ls, posterior, noise = result.least_squares, result.posterior, result.noise
     sigma, (low, high), stated = noise.coordinate.value, noise.coordinate.interval95, noise.stated_um
-    spread = say(
-        "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals", sigma=sigma, low=low, high=high
+    of = (
+        say("the stated {stated:.3g} µm and the residuals", stated=stated or 0.0)
+        if stated is not None
+        else say("the residuals")
     )
-    if stated is not None:
-        spread = say(
-            "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the stated {stated:.3g} µm and the residuals",
-            sigma=sigma, low=low, high=high, stated=stated,
-        )  # fmt: skip
+    spread = say("{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from {of}",
+                 sigma=sigma, low=low, high=high, of=of)  # fmt: skip
     if noise.p_value is not None:
         spread = say("{spread}; residuals under the stated figure: p = {p:.2g}", spread=spread, p=noise.p_value)
     count = ls.rank + ls.null_space.shape[1]
@@ -122,8 +121,9 @@ def method(result: Result) -> Section:
         "{what} are estimated from the observations with a linear measurement model, by least squares (orthogonal "
         "factorisation) and as a posterior distribution with priors as wide as physics allows; {length}. The attached job, "
         "recording and results.json suffice to run it again.",
-        what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
-        length=say("the certified length enters with its uncertainty") if certified else say("no certified length enters"),
+        what=say("Error factors") if result.model.effects else say("The quantities sought"),
+        length=say("the stated dimension of the artefact enters with its uncertainty") if certified else
+        say("no stated dimension of the artefact enters"),
     )  # fmt: skip
     return section(say("Method"), Paragraph(text), stated_facts)
 

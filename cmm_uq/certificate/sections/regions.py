@@ -25,7 +25,8 @@ from cmm_uq.certificate.wording import effect_title
 from cmm_uq.machine.model.field import FAMILIES, PERIODIC, PLAY, READ, STATED, allowed, family_of
 from cmm_uq.machine.model.readings import AxisReading
 from cmm_uq.machine.physics.catalogue import every
-from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
+from cmm_uq.maths.uncertainty.quantity import Quantity, rounded, significant
 
 _TITLE = say("Where the error factors hold")
 
@@ -62,19 +63,14 @@ def regions_section(result: Result) -> Section:
         "The first figures are means over the recorded set-ups. The machine has other errors besides, taken as large as this "
         "recording shows errors of their kind to be; elsewhere a factor differs by what they do."
     )
-    prior = say(
+    prior = UNMOVED if not rests else say(
         "Over the measuring range these rest on what was taken for the other errors before the recording, so that value or U "
-        "changes by a tenth of U or more with it: {names}.",
-        names=rests,
-    )
+        "changes by a tenth of U or more with it: {names}.", names=rests,
+    )  # fmt: skip
     read_by = readings_table(result.model.artefact.points.machine, regions.statements)
     tables = sizes_table(regions.scales), read_by, changes_table(regions.influence, names), further_table(further.each)
-    told = (
-        Paragraph(after(words, further.together)),
-        _table(result, regions, ranged),
-        Paragraph(prior) if rests else None,
-    )
-    return section(_TITLE, *told, *tables)
+    told = Paragraph(after(words, further.together)), _table(result, regions, ranged)
+    return section(_TITLE, *told, Paragraph(prior) if regions.influence else None, *tables)
 
 
 def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) -> Table | None:
@@ -96,7 +92,7 @@ def _table(result: Result, regions: FactorRegions, ranged: dict[Key, Quantity]) 
         "whole travel."
     )
     some, count = regions.observations
-    of = say("{some} of {count} observations are reckoned with.", some=some, count=count)
+    of = say("{some} of {count} observations are used for this.", some=some, count=count)
     return table(_TITLE, heads, rows, note, *([of] if some < count else []))
 
 
@@ -177,6 +173,7 @@ def _by_effect(values: Mapping[Key, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
+UNMOVED = say("Where priors of the machine's errors are half as wide, or twice, no figure changes by a tenth of U.")
 _LITTLE = 0.01  # change that is not worth a line
 _SHOWN = 0.5  # per cent that are not zero as printed
 
@@ -204,7 +201,7 @@ def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
     figures = (say("Physics allows"), say("As recorded"), say("95 % interval from"), say("to"))
     heads: tuple[Text | Column, ...] = (say("Errors"), *map(Column, figures), say("Unit"))
     rows = (
-        (family_words(one["family"]), *(number(float(f"{one[key]:.2g}"), "g") for key in keys), unit(one["unit"]))
+        (family_words(one["family"]), *(significant(one[key]) for key in keys), unit(one["unit"]))
         for one in families_data(scales)
     )
     return table(say("Sizes of errors, root mean square"), heads, rows, say(
@@ -217,15 +214,15 @@ def sizes_table(scales: Mapping[str, Floats]) -> Table | None:
 def changes_table(influence: Iterable[PriorInfluence], names: Sequence[Text]) -> Table | None:
     """``names`` of the figures that the changes are of."""
     of_u, of_value = (Column(head, unit("%")) for head in (say("u changes by"), say("Value changes by")))
-    heads = (say("Errors"), Column(say("Prior times")), of_u, say("Of"), of_value, say("Of"))
+    heads = (say("Errors"), Column(say("Prior width, times")), of_u, say("Of"), of_value, say("Of"))
     rows = (
         (family_words(one.family), number(one.times, "g"), *_largest(one.u - 1, names), *_largest(one.shift, names))
         for one in influence
-        if one.family == ALL or np.abs([one.u - 1, one.shift]).max() >= _LITTLE
+        if np.abs([one.u - 1, one.shift]).max() >= _LITTLE
     )
-    return table(say("If this were different"), heads, rows, say(
-        "The largest change of all figures, of the value as a part of its u. Errors of a family that the recording "
-        "hardly shows are scaled with its prior. Priors that would change nothing by more than 1 % are left out.",
+    return table(say("Influence of the priors"), heads, rows, say(
+        "The largest change of all figures, of the value as a part of its u, if the prior were as much wider. Errors of a "
+        "family that the recording hardly shows are scaled with its prior. Priors that change nothing by 1 % are left out.",
     ))  # fmt: skip
 
 
@@ -351,7 +348,7 @@ def shrinking(name: str, machine: Machine) -> Text:
     effect = every().get(name)
     family = None if effect is None else family_of(effect)
     if effect is None or family is None:
-        return NOTHING
+        return say("an artefact of calibrated length") if effect in SCALE.values() else NOTHING
     axis, measured = str(getattr(effect, "axis", "")), _SHRINKS.get(family, _AT_THE_PLACE)
     if family not in _SHRINKS or axis in machine.read_by:
         return measured

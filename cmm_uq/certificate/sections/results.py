@@ -139,13 +139,9 @@ def as_found_data(job: Job) -> dict[str, Any]:
     return {"as_found": found}
 
 
-_TOLERANCES = say("Tolerances by parameter")
-_INSIDE = {"pass": say("in"), "fail": say("out"), "undecided": say("open")}
-
-
 def tolerance_sections(result: Result) -> list[Section]:
     """Every parameter with a tolerance; none when the job sets none."""
-    toleranced, title = tolerances_of(result), _TOLERANCES
+    toleranced, title = tolerances_of(result), say("Tolerances by parameter")
     left_out = sorted(one.name.partition(".")[0] for one in toleranced if one.value is None)
     free, aside = (
         listed(names(name for name in left_out if (name in result.free) == known)) for known in (True, False)
@@ -163,7 +159,7 @@ def tolerance_sections(result: Result) -> list[Section]:
         effect, _, parameter = one.name.partition(".")
         quantity, tolerance = result.parameters[effect][parameter], result.job.facts.model.tolerances[effect]
         value, U, _ = wording.stated(quantity)
-        rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _INSIDE[one.outcome]))
+        rows.append((one.title, value, U, number(tolerance, "g"), one.unit, wording.OUTCOME_WORDS[one.outcome]))
         part = quantity.times(1 / tolerance, unit("1"))
         ratios.append((part.value, *part.interval95))
     out = listed([one.title for one in judged if one.outcome == "fail"])
@@ -174,8 +170,8 @@ def tolerance_sections(result: Result) -> list[Section]:
         alternative=say("Out of tolerance: {out}.", out=out) if out else say("No parameter is out of tolerance."),
     )
     figures = map(doc.Column, (say("Estimate"), say("U"), say("Tolerance")))
-    heads: tuple[Text | doc.Column, ...] = (say("Parameter"), *figures, say("Unit"), say("Verdict"))
-    inside = say("In or out: the whole 95 % interval is; otherwise open.")
+    heads: tuple[Text | doc.Column, ...] = (say("Parameter"), *figures, say("Unit"), say("Decision"))
+    inside = say("Pass or fail: the whole 95 % interval lies within the tolerance, or outside it; undecided otherwise.")
     return [section(title, plot, doc.table(say("Parameters and tolerances"), heads, rows, inside, *not_judged))]
 
 
@@ -257,7 +253,7 @@ def _chance(p: float) -> Text:
 
 
 _MOST = 8  # statements in the box; of more the gravest, all are behind the page
-_ROWS = 16  # of a table that the first page has room for
+_ROWS = {True: 26, False: 16}  # of a table that the first page has room for, without decisions and beside them
 
 _WORDS: Mapping[str, Text] = {
     "fail": say("Does not conform"),
@@ -318,16 +314,16 @@ def _row(one: Verdict, *, signed: bool) -> Text:
 def with_first(result: Result, sections: Sequence[Section]) -> list[Section]:
     """Sections, with the first page's: the picture of the gravest statement, else of the tolerances, else the main figures."""
     shown = min((s for s in result.statements if has_picture(s)), key=lambda s: _gravity(s.outcome), default=None)
-    plot: Plot | None = None
+    plot, title = None, say("Tolerances by parameter")
     if shown is not None:
         plot = picture(shown)
     elif len(result.verdicts) > len(result.statements):
-        plot = next((b for s in sections if s.title == _TOLERANCES for b in s.blocks if isinstance(b, Plot)), None)
+        plot = next((b for s in sections if s.title == title for b in s.blocks if isinstance(b, Plot)), None)
     if plot is None:
         first, *others = (section for section in sections if section.blocks)
         rows = sum(len(block.rows) for block in first.blocks if isinstance(block, Table))
-        return [replace(first, first=rows <= _ROWS), *others]
+        return [replace(first, first=rows <= _ROWS[result.verdicts.overall == NONE]), *others]
     rest = [replace(section, blocks=tuple(b for b in section.blocks if not (isinstance(b, Plot) and b.svg == plot.svg)))
             for section in sections]  # fmt: skip
-    title = named(shown) if isinstance(shown, Statement) else _TOLERANCES
-    return [Section(say("{what} against the limits", what=title), (plot,), first=True), *rest]
+    what = title if shown is None else named(shown)
+    return [Section(say("{what} against the limits", what=what), (plot,), first=True), *rest]

@@ -254,8 +254,7 @@ def _text(value: object | None) -> str:
 
 
 def _joined(*parts: object | None, by: str = ", ") -> str:
-    """What there is of the parts."""
-    return by.join(filter(None, map(_text, parts)))
+    return by.join(dict.fromkeys(filter(None, map(_text, parts))))
 
 
 def _rows(*rows: tuple[str, str]) -> Rows:
@@ -377,8 +376,10 @@ def _sentence(quantities: Iterable[QuantityFigures]) -> str:
 
 def _value(quantity: QuantityFigures, i: int) -> str:
     stated, unit = quantity.uncertainties[i], unit_shown(quantity.units[i])
-    U = "" if stated.expanded is None else f", U = {stated.expanded} (k = {stated.factor})"
-    return f"{quantity.values[i]} {unit}".rstrip() + U
+    if stated.low is not None and stated.high is not None:
+        return f"{' to '.join(_printed((stated.high - stated.low) / 2, stated.low, stated.high))} {unit}".rstrip()
+    value, U = _printed(stated.expanded, quantity.values[i], stated.expanded)
+    return f"{value} {unit}".rstrip() + (f", U = {U} (k = {stated.factor:.3g})" if U else "")
 
 
 def _certified(piece: Element) -> str:
@@ -390,7 +391,7 @@ def _identified(of: Element) -> list[str]:
 
 
 def _hashed(chain: dcc.Hash | None) -> str:
-    return "" if chain is None else f"{chain.referral_id} ({chain.procedure} {chain.value})"
+    return "" if chain is None else chain.referral_id + f" ({chain.procedure} {chain.value})" * (chain.value != "none")
 
 
 def _contact(contact: dcc.Contact) -> str:

@@ -104,7 +104,7 @@ class Size:
     unit: Unit  # as printed
     nominal: float  # where to start, in mm
     sd: float  # standard uncertainty of the certificate, mm; infinite without a certificate
-    what: Text = NOTHING  # it is, in words without whose: "length"; its title where left out
+    what: Text = NOTHING  # it is, without whose: "length"; its title where left out, or an instrument reads it
     # a dimension of the artefact; a size that the measurement is made for; or what is known of how it was set up (``nominal``
     # and ``sd`` are then in ``unit``)
     role: Role = "dimension"

@@ -65,7 +65,7 @@ def test_a_recorded_placing_is_tried_elsewhere_as_it_was_recorded() -> None:
     chosen = setting(GAUGE, length_mm=400.0)
     recorded = candidates(chosen)[40]
     found = candidates(chosen, Start(chosen.observed(recorded.points), recorded))
-    assert "as recorded" in {placing.title for placing in found}
+    assert "attitude as recorded" in {placing.title for placing in found}
     lengths = {round(float(np.linalg.norm(p.points.xyz[-1] - p.points.xyz[0])), 6) for p in found}
     assert len(lengths) == 1
 

@@ -114,7 +114,7 @@ def test_a_job_without_recording_gets_its_placings_as_table_page_and_recording_t
     assert len(data["placings"]) == 22
     assert data["better"]["kept"] == 20
     page = (out / "plan.html").read_text(encoding="utf-8")
-    assert "Placings 1 to 3" in page
+    assert "Set-ups 1 to 3" in page
     assert page.count("<svg") == 8 + 1  # twenty-two placings, three a row, and what the better plan gains
 
 

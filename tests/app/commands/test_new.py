@@ -198,7 +198,7 @@ def test_what_cannot_be_begun_is_refused_and_nothing_is_written(
 def test_a_new_plan_is_planned_and_a_new_budget_is_evaluated(tmp_path: Path) -> None:
     write_new(PLAN, tmp_path / "plan", {"artefact": {"kind": "step_gauge"}})
     planned = write_plan(tmp_path / "plan", tmp_path / "planned", power=False)
-    assert str(planned.summary.subject).startswith("7 placings, ")  # the lines of ISO 10360-2
+    assert str(planned.summary.subject).startswith("7 set-ups, ")  # the lines of ISO 10360-2
     (problem,) = check_job(tmp_path / "plan").problems
     assert "no such file" in problem.problem
     write_new(BUDGET, tmp_path / "budget", {})

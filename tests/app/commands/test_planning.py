@@ -271,7 +271,7 @@ def test_a_free_scale_is_said_in_words(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, "length_mm = 400.0", length="")
     page = render_html(plan_document(plan))
     assert "Scale error of X, Y and Z together, with the artefact&#39;s own length" in page
-    assert "Not determined by these placings" in page
+    assert "Not determined by these set-ups" in page
 
 
 @pytest.mark.parametrize(("parts", "said"), [
@@ -337,14 +337,14 @@ def test_what_is_not_known_of_the_noise_is_said(tmp_path: Path) -> None:
     data = plan_results(stated)
     assert data["noise"]["placing_um"] == pytest.approx(1.0)
     assert data["repeats"]["rows"][2]["readings"] == 120
-    assert "a minute of one more placing lowers every expected uncertainty more" in page
+    assert "a minute of one more set-up lowers every expected uncertainty more" in page
 
 
 @pytest.mark.long
 def test_repeats_beyond_what_they_are_worth_are_named(tmp_path: Path) -> None:
     page = render_html(plan_document(plan_of(tmp_path, "placing_um = 5.0\ngrowth_um = 0.0\nrepeats = 5")))
     assert "With 1 or more repeats" in page
-    assert "fewer repeats and more placings would tell more in the same time" in page
+    assert "Fewer repeats and more set-ups would tell more in the same time" in page
 
 
 def test_a_table_has_one_figure_in_brackets_for_one_more_placing(tmp_path: Path) -> None:

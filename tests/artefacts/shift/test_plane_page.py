@@ -49,8 +49,8 @@ def only_shifted(result: PlaneShiftResult) -> PlaneShiftResult:
 
 def test_it_tells_what_was_read_and_what_was_found_in_this_order(document: Document) -> None:
     assert [section.title for section in document.sections] == [
-        "Figures of performance", "Artefact and traceability", "Errors of the axes", "What the placings leave open",
-        "Residuals", "Placings", "Method",
+        "Figures of performance", "Artefact and traceability", "Errors of the axes", "What the set-ups leave open",
+        "Residuals", "Set-ups", "Method",
     ]  # fmt: skip
 
 
@@ -77,7 +77,7 @@ def test_every_figure_holds_its_truth_within_twice_its_uncertainty(
 
 
 def test_placings_are_stated_as_found(document: Document) -> None:
-    turned = [number(row[1]) for row in tables(document)["Placings, as found from the readings"].rows]
+    turned = [number(row[1]) for row in tables(document)["Set-ups, as found from the readings"].rows]
     assert turned == pytest.approx([0.0, 0.08, -0.02, 0.03, 90.08, 89.98, 179.98], abs=0.006)
 
 
@@ -110,12 +110,12 @@ def test_results_keep_their_contract(result: PlaneShiftResult) -> None:
 @pytest.mark.long
 def test_a_plate_that_is_only_shifted_states_no_scale_and_no_squareness(only_shifted: PlaneShiftResult) -> None:
     assert not {"squareness_xy", "scale_x", "scale_y"} & set(only_shifted.scalars)
-    assert "Not determined by these placings: scale of X, scale of Y and squareness X–Y" in warnings(only_shifted)[0]
-    open_ = next(section for section in sections(only_shifted) if section.title == "What the placings leave open")
+    assert "Not determined by these set-ups: scale of X, scale of Y and squareness X–Y" in warnings(only_shifted)[0]
+    open_ = next(section for section in sections(only_shifted) if section.title == "What the set-ups leave open")
     words = " ".join(block.text for block in open_.blocks if isinstance(block, Paragraph))
-    assert "a placing turned by 90° parts them" in words
+    assert "a set-up turned by 90° parts them" in words
     assert "one known length" in words
-    assert "are the same in all placings" in words
+    assert "are the same in all set-ups" in words
     captions = [b.caption for section in sections(only_shifted) for b in section.blocks if isinstance(b, Table)]
     assert "The plate's own geometry" not in captions
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import subprocess
 from collections import Counter
 from functools import cache
@@ -55,6 +56,14 @@ def test_other_programs_read_a_catalogue_too(code: Code) -> None:
     if (program := which("msgfmt")) is not None:
         done = subprocess.run([program, "-c", "-o", os.devnull, file_of(code)], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
+
+
+def test_french_signs_of_two_parts_stand_behind_a_space_that_does_not_break() -> None:
+    """And apostrophes are those of print."""
+    forms = [form for entry in read(file_of("fr")) for form in forms_of(entry)]
+    assert [
+        form for form in forms if re.search(r"'|«(?![\u00a0\u202f])|(?<![\u00a0\u202f])[;:!?»](?=\s|$)", form)
+    ] == []
 
 
 def test_no_sentence_begins_or_ends_with_a_blank_that_a_translator_would_lose() -> None:

@@ -68,22 +68,25 @@ def test_sizes_are_those_of_the_draws_times_what_physics_allows(found: PartMeasu
     share = (2 + squares[:2].sum()) / (2 + squares.sum())
     assert rotation["size"] == rotation["allowed"] == pytest.approx(30 * np.sqrt(share))
     rows = tables(told(sized, change(found)))["Sizes of errors, root mean square"].rows
-    assert rows[0] == ("Play of the drives", "30", "6", "0.3", "12", "µm")
+    assert rows[0] == ("Play of the drives", "30", "6.0", "0.30", "12", "µm")
     assert rows[1] == ("Rotations, long waves", "29", "29", "29", "29", "″")
 
 
 def test_the_largest_change_is_told_with_whose_it_is(found: PartMeasurement) -> None:
     """u falls by 4 % at most and of the second, the value moves by 0.03 u at most and of the first, downwards."""
-    table = tables(told(found, change(found, [1.02, 0.96], [-0.03, 0.01], times=0.5)))["If this were different"]
+    table = tables(told(found, change(found, [1.02, 0.96], [-0.03, 0.01], times=0.5)))["Influence of the priors"]
     one, two = (each.name for each in found.characteristics[:2])
     assert table.rows == (("Play of the drives", "0.5", "−4", two, "−3", one),)
 
 
-def test_what_changes_nothing_is_no_row_but_that_of_all(found: PartMeasurement) -> None:
+def test_what_changes_nothing_is_no_row_and_a_sentence_says_so(found: PartMeasurement) -> None:
+    """Below 1 % there is no row, of all priors together neither; without rows there is no table."""
     little = change(found, [1.009], [0.004])
-    table = tables(told(found, little, replace(little, family=ALL)))["If this were different"]
-    one = found.characteristics[0].name
-    assert table.rows == (("All of them together", "2", "1", one, "0", "–"),)
+    calm = told(found, little, replace(little, family=ALL))
+    assert "Influence of the priors" not in tables(calm)
+    assert str(paragraph(calm).text).endswith("no figure changes by a tenth of U.")
+    table = tables(told(found, little, replace(change(found, [1.011]), family=ALL)))["Influence of the priors"]
+    assert table.rows == (("All of them together", "2", "1", found.characteristics[0].name, "0", "–"),)
 
 
 def test_results_have_every_change(found: PartMeasurement) -> None:

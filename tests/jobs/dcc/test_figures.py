@@ -14,6 +14,7 @@ from cmm_uq.jobs.dcc.figures import (
     QuantityFigures,
     ValueUncertainty,
     _grid,
+    _sentence,
     data,
     figures,
     shown,
@@ -126,6 +127,18 @@ def test_of_our_own_certificate_a_row_is_a_factor_rounded_by_its_uncertainty_wit
     assert (scale[place("Quantity")], scale[place("Value")], scale[place("U")]) == ("Scale error of Y", "110", "42")
     assert (scale[place("k")], scale[place("Interval")]) == ("2.05", "72 to 152")
     assert (length[place("Value")], length[place("U")], length[place("k")]) == ("83.00012", "0.0006", "2")
+
+
+def test_a_statement_is_read_rounded_by_its_uncertainty_and_an_interval_as_its_ends() -> None:
+    """U = 14.142135624 of 339.8819116 µm are 340 and 14; an interval is no value by itself."""
+    low, high = D("314.7"), D("368.0")
+    stated = (
+        QuantityFigures((), "worst", values=(D("339.8819116"),), units=(r"\micro\metre",),
+                        uncertainties=(ValueUncertainty(D("14.142135624"), D(2)),)),
+        QuantityFigures((), "largest", values=(D("341.4482868"),), units=(r"\micro\metre",),
+                        uncertainties=(ValueUncertainty(low=low, high=high),)),
+    )  # fmt: skip
+    assert _sentence(stated) == "worst 340 µm, U = 14 (k = 2); largest 314.7 to 368.0 µm"
 
 
 def test_data_keeps_the_digits_of_the_certificate() -> None:

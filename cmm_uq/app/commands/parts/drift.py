@@ -23,7 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.messages import NOTHING, Text, commas, plural, say, semicolons, sentences
 from cmm_uq.certificate.part.measurement import FurtherSetUps, UnseenError
-from cmm_uq.certificate.wording import effect_title, titles
+from cmm_uq.certificate.wording import titles
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.due.drift import DriftHistory, history
 from cmm_uq.laboratory.due.drift_filter import change_since
@@ -32,6 +32,7 @@ from cmm_uq.laboratory.records.facts import Series
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
 
 FILE = "machine-records/history.json"  # by its name among the inputs of a part's report
 SCHEMA = "cmm-uq/machine-history/1"
@@ -167,11 +168,11 @@ FOLDER = "further"  # of the job that plans them, beside the part's page
 MOST, SET_UPS, CANDIDATES = 5, 4, 60
 
 _SHOWN_BY: tuple[tuple[str, Text], ...] = (
-    ("approach_", say("a gauge whose faces are met from both sides, such as a step gauge, shows it")),
-    ("tip_", say("the artefact probed with a stylus to the side shows it")),
+    ("approach_", say("a gauge whose faces are met from both sides, such as a step gauge, would show this")),
+    ("tip_", say("the artefact probed with a stylus to the side would show this")),
     ("time_s", say("it shows where the time of each point is recorded")),
     ("temp_", say("it shows where the temperatures of the scales are recorded")),
-    ("n", say("points probed on surfaces, with their normals, show it")),
+    ("n", say("points probed on surfaces, with their normals, would show this")),
 )
 """By the beginning of a column that an error needs and the recording lacks."""
 
@@ -205,11 +206,12 @@ def further_of(
 def _why_not(calibrated: Job, effect: Effect) -> Text | None:
     """Why no set-up of the artefact, recorded as it was, shows an error; ``None`` where one may."""
     if effect.shape:
-        return say("positions that lie closer than its period show it")
+        return say("positions that lie closer than the period would show this")
     lacks = [name for name in effect.columns if name not in calibrated.points.columns]
     if not lacks:
         return None
-    return next((text for begin, text in _SHOWN_BY if lacks[0].startswith(begin)), say("another artefact may show it"))
+    shown_by = (text for begin, text in _SHOWN_BY if lacks[0].startswith(begin))
+    return next(shown_by, say("another artefact may show this"))
 
 
 def _asked(calibrated: Job, names: Iterable[str]) -> list[str]:
@@ -254,12 +256,13 @@ def _setups(plan: MeasurementPlan | None, found: Sequence[str]) -> Text:
 def _missed(calibrated: Job, missed: Sequence[str]) -> Text:
     if not missed:
         return NOTHING
-    told = [
-        say("{title} ({how})", title=effect_title(name),
-            how=_why_not(calibrated, every()[name]) or say("another artefact, or more set-ups, may show it"))
-        for name in missed
-    ]  # fmt: skip
-    return say("Set-ups of the artefact as it was recorded do not show: {effects}.", effects=commas(told))
+    told: dict[Text, list[str]] = {}
+    for name in missed:
+        may = say("an artefact of calibrated length would show this") if every()[name] in SCALE.values() else None
+        how = _why_not(calibrated, every()[name]) or may or say("another artefact, or more set-ups, may show this")
+        told.setdefault(how, []).append(name)
+    each = (say("{title} ({how})", title=commas(titles(names)), how=how) for how, names in told.items())
+    return say("Set-ups of the artefact as it was recorded do not show: {effects}.", effects=semicolons(each))
 
 
 def _files(calibrated: Job, found: Sequence[str]) -> dict[str, bytes]:
