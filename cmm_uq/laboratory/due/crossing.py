@@ -8,7 +8,7 @@ probabilities are averaged. The random numbers are fixed: the same history gives
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import lru_cache
@@ -34,6 +34,7 @@ def grid(gaps: int) -> Floats:
 DAYS, FINE = grid(48), grid(160)  # A sixth further each, for many machines whose dates are wide; a twentieth, for one
 PATHS = 2048
 _AT_ONCE = 2_000_000
+_GAPS = 15_000  # levels of paths that are moved together: they stay in the cache of a core
 _SEED = 20
 
 
@@ -114,7 +115,12 @@ class Crossing:
 
 
 def crossing(
-    series: Series | drift.DriftHistory, limit: float, prior: drift.DriftPrior | None = None, *, until: float = _HORIZON
+    series: Series | drift.DriftHistory,
+    limit: float,
+    prior: drift.DriftPrior | None = None,
+    *,
+    until: float = _HORIZON,
+    enough: float = 1.0,
 ) -> Crossing:
     """When one machine's error will first be beyond its limit.
 
@@ -124,6 +130,7 @@ def crossing(
     limit : the error conforms while |error| ≤ limit.
     prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_model.FleetPrior.prior`), or none.
     until : days after the last certificate that are looked at.
+    enough : probability beyond which nobody asks for the day.
 
     Raises
     ------
@@ -132,12 +139,13 @@ def crossing(
     if not (np.isfinite(limit) and limit > 0):
         raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
     known = series if isinstance(series, drift.DriftHistory) else drift.history(series)
-    return crossing_of(followed(known, limit, prior), limit, until)
+    return crossing_of(followed(known, limit, prior), limit, until, enough)
 
 
-def crossing_of(known: FollowedHistory, limit: float, until: float = _HORIZON) -> Crossing:
+def crossing_of(known: FollowedHistory, limit: float, until: float = _HORIZON, enough: float = 1.0) -> Crossing:
     """The same of a history that was followed already."""
-    return crossings(known.machines, known.prior, known.state, limit, until=until, days=FINE).one(0)
+    of = known.machines, known.prior, known.state, limit
+    return crossings(*of, until=until, days=FINE, enough=enough).one(0)
 
 
 class _States(NamedTuple):
@@ -153,9 +161,9 @@ class _States(NamedTuple):
 
 def crossings(
     machines: drift.Histories, prior: drift.DriftPrior, state: DriftState, limit: Floats | float, *,
-    paths: int = PATHS, until: float = _HORIZON, days: Floats = DAYS,
+    paths: int = PATHS, until: float = _HORIZON, days: Floats = DAYS, enough: float = 1.0,
 ) -> Crossings:  # fmt: skip
-    """When the errors of many machines will be; later than ``until`` days, probabilities are those of that day."""
+    """When the errors of many machines will be; later than ``until`` days, or than all have ``enough``, it stays as it is."""
     N, M = len(machines), state.log_weight.shape[2]
     c = 2 + len(prior.components)
     flat = _States(
@@ -165,8 +173,8 @@ def crossings(
     limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), N)
     chunk = max(1, _AT_ONCE // (paths * 8))
     numbers, ahead = _numbers(paths, len(days) - 1), days[: 1 + int(np.searchsorted(days, until))]
-    found = [_probabilities(flat, np.arange(i, min(i + chunk, N)), limits, numbers, ahead)
-             for i in range(0, N, chunk)]  # fmt: skip
+    each = (np.arange(i, min(i + chunk, N)) for i in range(0, N, chunk))
+    found = [_probabilities(flat, which, limits, numbers, ahead, enough) for which in each]
     mean = (flat.weight * flat.mean[:2]).sum(axis=-1)
     variance = flat.covariance[[0, 1], [0, 1]]
     u = np.sqrt((flat.weight * (variance + (flat.mean[:2] - mean[..., None]) ** 2)).sum(axis=-1))
@@ -203,7 +211,9 @@ def _drawn(states: _States, which: Ints, chosen: Ints, normal: Floats) -> Floats
     return drawn
 
 
-def _probabilities(states: _States, which: Ints, limits: Floats, numbers: tuple[Floats, ...], days: Floats) -> Floats:
+def _probabilities(
+    states: _States, which: Ints, limits: Floats, numbers: tuple[Floats, ...], days: Floats, enough: float
+) -> Floats:
     place, normal, walk, stepping = numbers
     cumulated = np.cumsum(states.weight[which], axis=1)
     chosen = np.stack([np.searchsorted(row / row[-1], place) for row in cumulated])
@@ -214,30 +224,39 @@ def _probabilities(states: _States, which: Ints, limits: Floats, numbers: tuple[
     size, high = prior.step_sd[node] / walking, limits[which][:, None] / walking
     inside = (np.abs(level) <= high).astype(np.float64)
     part = np.full(len(place), 1 / len(place))
-    survival = np.empty((len(which), len(days)))
-    survival[:, 0] = inside @ part
-    moves = _moves(states, which, node, theta, days)
-    wandering = walk[: len(years)] * np.sqrt(years)[:, None]
-    for g, (gap, (move, up, up_then, down, down_then)) in enumerate(zip(years, moves, strict=True)):
-        after = level + move
-        after += wandering[g]
+    survival = np.repeat((inside @ part)[:, None], len(days), axis=1)
+    moves, at_once = _moves(states, which, node, theta, days), max(1, _GAPS // level.size)
+    for start in range(0, len(years), at_once):
+        gaps = slice(start, min(start + at_once, len(years)))
+        gap, (move, up, up_then, down, down_then) = years[gaps, None, None], moves(gaps)
+        stepped = stepping[0, gaps, None] < often * gap
+        steps = np.where(stepped, size * stepping[1, gaps, None], 0.0)
+        wandering = (walk[gaps] * np.sqrt(years[gaps])[:, None])[:, None]
+        before, after = (np.empty((len(gap), *level.shape)) for _ in range(2))
+        for g in range(len(gap)):
+            before[g] = level
+            after[g] = level + move[g] + wandering[g]
+            level = after[g] + steps[g]
         # probability that a bridge from one level to the other stays within the limits, given that its ends do
-        crosses = np.expm1(-2 / gap * np.maximum(high - level - up, 0.0) * np.maximum(high - after - up_then, 0.0))
+        crosses = np.expm1(-2 / gap * np.maximum(high - before - up, 0.0) * np.maximum(high - after - up_then, 0.0))
         crosses *= -np.expm1(
-            -2 / gap * np.maximum(high + level - down, 0.0) * np.maximum(high + after - down_then, 0.0)
+            -2 / gap * np.maximum(high + before - down, 0.0) * np.maximum(high + after - down_then, 0.0)
         )
-        inside *= -crosses
-        level, stepped = after, np.nonzero(stepping[0, g] < often * gap)
-        level[stepped] += size[stepped] * stepping[1, g, stepped[1]]
-        inside[stepped] *= np.abs(level[stepped]) <= high[stepped]
-        survival[:, g + 1] = inside @ part
+        crosses *= -(~stepped | (np.abs(after + steps) <= high)).astype(np.float64)
+        crosses[0] *= inside
+        np.multiply.accumulate(crosses, axis=0, out=crosses)
+        inside = crosses[-1]
+        survival[:, start + 1 :] = (inside @ part)[:, None]
+        survival[:, 1 + start : 1 + start + len(gap)] = (crosses @ part).T
+        if survival[:, -1].max() < 1 - enough:
+            break
     return 1.0 - survival
 
 
 def _moves(
     states: _States, which: Ints, node: Ints, theta: Sequence[Floats], days: Floats
-) -> Iterator[tuple[Floats, Floats | float, Floats | float, Floats | float, Floats | float]]:
-    """Of each gap (n, paths) each: what the level moves by, how far the season rises above both its ends, and falls below."""
+) -> Callable[[slice], tuple[Floats, Floats | float, Floats | float, Floats | float, Floats | float]]:
+    """Of some gaps (g, n, paths) each: what the level moves by, how far the season rises above both ends, and falls below."""
     of, prior = states.machines, states.prior
     since, first, settling = (each[which][:, None] for each in (of.last, of.first, of.settles))
     until = since + days
@@ -251,20 +270,20 @@ def _moves(
     place, growing = node * len(which) + np.arange(len(which))[:, None], theta[0] * prior.growth[node]
     rate, growth = (np.diff(each, axis=-1).T[..., None] for each in (by_rate, by_growth))
     if len(theta) == 1:
-        yield from ((a * theta[0] + b * growing, 0.0, 0.0, 0.0, 0.0) for a, b in zip(rate, growth, strict=True))
-        return
+        return lambda gaps: (rate[gaps] * theta[0] + growth[gaps] * growing, 0.0, 0.0, 0.0, 0.0)
     phase, cosine, sine = drift.phase(until).T[..., None], theta[2], theta[3]
     most, crest = np.hypot(cosine, sine), np.arctan2(sine, cosine) / (2 * np.pi)
-    ends: list[tuple[Floats, ...]] = []
-    for g, (c, s, turn) in enumerate(zip(np.cos(phase), np.sin(phase), phase / (2 * np.pi), strict=True)):
-        then, turned = c * cosine + s * sine, turn - crest
-        ends = [*ends[-1:], (then, most - then, most + then, np.floor(turned), np.floor(turned + 0.5))]
-        if g:
-            (now, rise, fall, *before), (then, rise_then, fall_then, *after) = ends
-            move = rate[g - 1] * theta[0] + growth[g - 1] * growing + then - now
-            move += by_settling[g - 1].take(place) * theta[1]
-            up, down = (b > a for a, b in zip(before, after, strict=True))
-            yield move, up * rise, up * rise_then, down * fall, down * fall_then
+
+    def moves(gaps: slice) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        own = phase[gaps.start : gaps.stop + 1]
+        season, turned = np.cos(own) * cosine + np.sin(own) * sine, own / (2 * np.pi) - crest
+        rise, fall = most - season, most + season
+        move = rate[gaps] * theta[0] + growth[gaps] * growing + season[1:] - season[:-1]
+        move += by_settling[gaps].take(place, axis=1) * theta[1]
+        up, down = (np.diff(np.floor(each), axis=0) > 0 for each in (turned, turned + 0.5))
+        return move, up * rise[:-1], up * rise[1:], down * fall[:-1], down * fall[1:]
+
+    return moves
 
 
 def _log_survival(probability: Floats) -> Floats:

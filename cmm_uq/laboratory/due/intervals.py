@@ -23,7 +23,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import optimize, special
+import scipy
+from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
@@ -211,7 +212,7 @@ def interval_of_reliability(
     i = int(np.argmax(short))
     if not i:
         return 0.0 if short[0] else float("inf")
-    return float(optimize.brentq(lambda t: float(excess(np.array([t]))[0]), times[i - 1], times[i]))
+    return float(scipy.optimize.brentq(lambda t: float(excess(np.array([t]))[0]), times[i - 1], times[i]))
 
 
 def _powers(days: Floats, order: int) -> Floats:
@@ -250,9 +251,9 @@ def drift_interval(
     found: list[tuple[float, str, bool]] = []
     refused: CmmUqError | None = None
     for one, limit in limited:
-        soonest = min(found, default=(HORIZON * YEAR,))[0]
+        soonest, part = min(found, default=(HORIZON * YEAR,))[0], 1 - reliability
         try:
-            crossed = crossing(one, limit, priors.get(one.name), until=soonest + 1).quantile(1 - reliability)
+            crossed = crossing(one, limit, priors.get(one.name), until=soonest + 1, enough=part).quantile(part)
         except CmmUqError as error:
             refused = error
             continue

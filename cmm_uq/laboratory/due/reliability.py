@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy import optimize, special
+import scipy
+from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -186,7 +187,8 @@ def _most_likely(model: ReliabilityModel, data: ReliabilityData, scale: float) -
         return np.asarray(np.sign(data.in_tolerance - data.tested * r) * np.sqrt(2 * np.maximum(lacking, 0)))
 
     found = [
-        optimize.least_squares(deviances, start, bounds=(0.0, _LARGEST), max_nfev=_SEARCHED) for start in model.starts
+        scipy.optimize.least_squares(deviances, start, bounds=(0.0, _LARGEST), max_nfev=_SEARCHED)
+        for start in model.starts
     ]
     return np.asarray(min(found, key=lambda one: float(one.cost)).x)
 
@@ -202,7 +204,7 @@ def _time_of(model: ReliabilityModel, parameters: Floats, level: float) -> float
     def excess(t: float) -> float:
         return float(model.reliability(np.array([t]), parameters)[0]) - level
 
-    return float(optimize.brentq(excess, times[i - 1], times[i]))
+    return float(scipy.optimize.brentq(excess, times[i - 1], times[i]))
 
 
 def _alike(intervals: Sequence[float | None]) -> list[int]:
