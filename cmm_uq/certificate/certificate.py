@@ -68,13 +68,13 @@ def certificate_of(
 
 def formal_document(
     job: Identification, laboratory: Laboratory, inputs: Mapping[str, bytes], files: tuple[Text, ...] = (), *, draft: bool,
-    authorised: bool = True, **stated: Any,
+    authorised: bool = True, general: tuple[Text, ...] = clauses.STATEMENTS, **stated: Any,
 ) -> Document:  # fmt: skip
     """A document that the laboratory answers for, and signs where it is ``authorised``; ``stated``: see :class:`Document`.
 
     It is without keys of the job, which the laboratory reads from ``check``, the terminal and results.json.
     """
-    statements = (*clauses.STATEMENTS, *((clauses.NOT_OURS,) if job.from_customer else ()))
+    statements = (*general, *((clauses.NOT_OURS,) if job.from_customer else ()))
     signature = Signature(Verbatim(laboratory.signatory), Verbatim(laboratory.signatory_role))
     found: Document = with_each_text(Document(
         number=Verbatim(job.number or job.id), date=job.issued or job.date, logo=logo_of(laboratory, inputs),

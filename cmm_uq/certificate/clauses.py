@@ -181,7 +181,9 @@ Status = Literal["stated", "missing", "not applicable", "laboratory"]
 
 STATEMENTS = (
     say("The results relate only to the item named above, in its condition and place at the time of the measurement."),
-    say("This document shall not be reproduced except in full without the written approval of the issuing laboratory."),
+    say(
+        "This certificate shall not be reproduced except in full without the written approval of the issuing laboratory."
+    ),
 )
 """ISO/IEC 17025:2017, 7.8.2.1 l) and the note to 7.8.2.1."""
 

@@ -161,7 +161,7 @@ def _values(
 
 _TITLES: Mapping[str, Text] = MappingProxyType({
     "accuracy_uncertainty": say("Figures of performance"), "estimates": say("Error factors of the machine"),
-    "performance_of_machine": say("Figures of performance of the machine alone"),
+    "performance_of_machine": say("Figures of performance of the machine, without noise"),
     "over_range": say("Error factors over the measuring range"),
     "differences": say("Differences that are determined"), "artefact": say("Sizes of the artefact after the fit"),
     "certified": say("Certified sizes of the artefact"), "tolerances": say("Parameters and tolerances"),

@@ -16,7 +16,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, holding,
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import certificate, document as doc
-from cmm_uq.certificate.clauses import Requirement, asked, not_stated, of_every_report
+from cmm_uq.certificate.clauses import STATEMENTS, Requirement, asked, not_stated, of_every_report
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.part import budget_section as causes, method
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
@@ -140,7 +140,8 @@ def part_document(found: PartMeasurement) -> doc.Document:
         particulars=_particulars(found), warnings=(*found.warnings, *not_stated(lacking)),
         sections=tuple(section for section in sections if section.blocks),
         produced_by=say("{program}, seed {seed}", program=method.program_words(), seed=found.seed), end=say("End of report"),
-        overview=overview_of(found),
+        overview=overview_of(found), general=(STATEMENTS[0], say(
+            "This report shall not be reproduced except in full without the written approval of the issuing laboratory.")),
     )  # fmt: skip
 
 
@@ -177,17 +178,14 @@ def results_section(found: PartMeasurement) -> Section:
     """Every characteristic with its value, if anything was measured, and its uncertainty."""
     measured, reported = found.measured is not None, found.job.reported is not None
     tables = (_table(part, measured=measured, reported=reported) for part in _parts(figures_of(found)))
-    return section(say("Results"), None if measured else Paragraph(_UNMEASURED), *tables)
+    return section(say("Results"), None if measured else Paragraph(say(
+        "Nothing was measured: what follows is how surely this measurement, done as it is planned, will know the part."
+    )), *tables)  # fmt: skip
 
 
 def _parts(every: Sequence[CharacteristicFigures]) -> list[list[CharacteristicFigures]]:
     """Lengths and then angles, those that there are."""
     return list(filter(None, ([one for one in every if one.angular == angular] for angular in (False, True))))
-
-
-_UNMEASURED = say(
-    "Nothing was measured: what follows is how surely this measurement, done as it is planned, will know the part."
-)
 
 
 def _table(every: Sequence[CharacteristicFigures], *, measured: bool, reported: bool) -> Table | None:
