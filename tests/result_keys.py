@@ -34,6 +34,7 @@ RESULTS: Mapping[str, str] = {
     "replaced.differences[].KEY": "What differs: what, before, after (null where a certificate does not have it), unit.",
     "replaced.added[].KEY": "What the replaced certificate does not state, likewise.",
     "job.language": "Language of the documents, where it is not English.",
+    "job.interim": "That it is an interim check between two calibrations; left out of a certificate.",
     "job.inputs_sha256.FILE": "SHA-256 of each input.",
     "import[].KEY": "Of each file in another format than the project's own, how it was read: format, encoding, unit, …",
     "import[].columns.COLUMN": "Heading of the file that a column of the recording was taken from.",

@@ -36,6 +36,8 @@ from cmm_uq.machine.model.recorded import expansion, length_of
 from cmm_uq.machine.physics.digitizer import THREE_ATTITUDES
 from cmm_uq.machine.physics.effects.probing import attitudes
 from cmm_uq.machine.physics.kinematics import euler_313
+from cmm_uq.maths.geometry.feature import BallForm
+from cmm_uq.maths.inference.posterior import symmetric_root
 
 _TOLD = 0.05  # least singular value of what the bars tell of the offset, over the root of their number
 _AROUND = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])  # the readings of a ball, in units of its radius
@@ -95,7 +97,20 @@ class ScannedBallbar(Ballbar):
         lengths = self.lengths()
         length, sd = length_of(facts, float(lengths.mean()), "the scanned bars", where)
         dimension = Size("length_mm", say("Length of the bar"), unit("mm"), length, sd, say("length"))
+        if not facts.ball_form_um:
+            self.exact = ((say("The form of the balls is not stated"), np.ones(len(self.rows), dtype=bool)),)
         self.sizes = (dimension, *(offset_sizes(self._offset) if self._tells_offset(where) else ()))
+
+    def form_changes(self, form: float) -> Floats:
+        """What the form of each ball does to its centre, the same in the frame of the digitizer wherever it is seen alike."""
+        if not self._ball_form_um or not self.balls:
+            return np.zeros((len(self.rows), 0))
+        moved = np.zeros((len(self.balls), 3, 6))
+        for i, one in enumerate(self.balls):
+            covariance = BallForm(one.form_mm).covariance(one.directions)[:3, :3]
+            start = 3 * (i % 2)
+            moved[i, :, start : start + 3] = one.attitude @ symmetric_root(one.attitude.T @ covariance @ one.attitude)
+        return self._along(moved)
 
     def ends(self) -> Floats:
         return self._centre.reshape(-1, 2, 3)

@@ -152,7 +152,7 @@ def _unstated(found: PartMeasurement) -> list[Text]:
 def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
     """That nothing is called conforming by an uncertainty that lacks styli, temperatures, expansion or form."""
     facts, room = found.job.facts, found.job.facts.environment
-    touching = any(one.diameter_mm and not (one.u_diameter_um or one.lobing_um) for one in facts.stylus)
+    touching = any(one.diameter_mm and not one.u_diameter_um for one in facts.stylus)
     cold = room.part_c == REFERENCE_TEMPERATURE
     without = holding(
         (touching, say("qualification of the styli")),

@@ -45,7 +45,8 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
     there: dict[str, Any] = {
         "serial": serial or None, "derived_from": facts.derived_from and facts.derived_from.model_dump(),
         "replaces": facts.replaces and facts.replaces.model_dump(mode="json", exclude_none=True),
-        "altered": list(job.altered) or None, "language": facts.language if facts.language != ENGLISH else None,
+        "altered": list(job.altered) or None, "interim": facts.interim or None,
+        "language": facts.language if facts.language != ENGLISH else None,
     }  # fmt: skip
     said = {
         "id": facts.id, "origin": facts.origin, "date": facts.date.isoformat(), "machine": job.facts.machine.name,

@@ -235,6 +235,11 @@ class ProofJudgement:
         return self.of_kind(*KINDS)
 
     @cached_property
+    def hiding(self) -> list[JudgedCase]:
+        """Cases that hide effects; of one without an answer none is found."""
+        return [one for one in self.cases if one.case.kind in (ONE, TWO)]
+
+    @cached_property
     def refused(self) -> Rate:
         return Rate(len(self.cases) - len(self.answered), len(self.cases))
 
@@ -245,12 +250,12 @@ class ProofJudgement:
 
     @cached_property
     def found(self) -> Rate:
-        return Rate.pooled((len(one.found), len(one.case.hidden)) for one in self.of_kind(ONE, TWO))
+        return Rate.pooled((len(one.found), len(one.case.hidden)) for one in self.hiding)
 
     @cached_property
     def found_alone(self) -> Rate:
         """Those of them that are told from all others."""
-        return Rate.pooled((len(one.alone), len(one.case.hidden)) for one in self.of_kind(ONE, TWO))
+        return Rate.pooled((len(one.alone), len(one.case.hidden)) for one in self.hiding)
 
     @cached_property
     def wrong_names(self) -> Rate:
@@ -300,7 +305,7 @@ class ProofJudgement:
 
     @property
     def _strengths(self) -> list[tuple[float, bool]]:
-        return [(h.strength, h.effect in one.found) for one in self.of_kind(ONE, TWO) for h in one.case.hidden]
+        return [(h.strength, h.effect in one.found) for one in self.hiding for h in one.case.hidden]
 
     @cached_property
     def by_strength(self) -> DetectionCurve | None:
@@ -315,7 +320,7 @@ class ProofJudgement:
 
     def of_effect(self, name: str) -> tuple[Rate, int]:
         """How often an effect was found where it was hidden, and how often it was named where it did not act."""
-        where = [one for one in self.of_kind(ONE, TWO) if any(h.effect == name for h in one.case.hidden)]
+        where = [one for one in self.hiding if any(h.effect == name for h in one.case.hidden)]
         return _rate(where, lambda one: name in one.found), sum(name in one.wrong for one in self.answered)
 
     def by_noise(self, kind: str) -> tuple[Rate, Rate, Rate]:

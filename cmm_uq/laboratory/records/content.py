@@ -115,7 +115,8 @@ def _of_results(job: Mapping[str, Any]) -> dict[str, Any]:
     machine = {"serial": str(job.get("serial") or ""), "name": str(job["machine"])}
     return {
         "number": str(job["id"]), "machine": {**machine, "manufacturer": "", "model": "", "place": ""},
-        "artefact": {}, "kind": "", "adjusted_since": None, "interim": False, "operator": "", "four_eyes": False,
+        "artefact": {}, "kind": "", "adjusted_since": None, "interim": bool(job.get("interim")), "operator": "",
+        "four_eyes": False,
     }  # fmt: skip
 
 

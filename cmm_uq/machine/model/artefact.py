@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
@@ -240,6 +241,15 @@ class Artefact(ABC):
     def form_patterns(self) -> Floats:
         """Patterns (m, r) that a deviation of its form may have; none of what has no form of its own."""
         return np.zeros((len(self.rows), 0))
+
+    def form_changes(self, form: float) -> Floats:
+        """Changes (m, r) of the observations, mm, for one standard uncertainty of what a deviation of its form may be.
+
+        ``form``: deviation, mm; a pattern of mean square one over the points has a quarter of it.
+        """
+        patterns = self.form_patterns()
+        whole = patterns if not form else 0.25 * form * np.sqrt(len(patterns)) * scipy.linalg.orth(patterns)
+        return np.asarray(whole, dtype=np.float64)[:, : None if form else 0]
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
         """A point on the line of each length between two points, and the line's direction, (m, 3) each."""

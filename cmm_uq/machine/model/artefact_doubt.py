@@ -19,7 +19,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from cmm_uq.base.messages import Text, say
@@ -181,9 +180,8 @@ def causes_of(artefact: Artefact, circumstances: Circumstances) -> tuple[Cause, 
     pattern of mean square one over the points. What all patterns together do to an estimate is what its own would do.
     """
     stated, along, set_up = circumstances.uncertainty, growth(artefact), artefact.measurement
-    form = np.hypot(artefact.form, stated.u_form_um * MICROMETRE)
-    shapes = form / 4 * np.sqrt(len(set_up)) * scipy.linalg.orth(artefact.form_patterns()) if form else np.zeros(0)
-    forms = (Cause.of_blocks(say("form of the artefact"), shapes, set_up),) if shapes.size else ()
+    form = artefact.form_changes(float(np.hypot(artefact.form, stated.u_form_um * MICROMETRE)))
+    forms = (Cause.of_blocks(say("form of the artefact"), form, set_up),) if form.size else ()
     if along is None:
         return forms
     excess = np.zeros(len(along))

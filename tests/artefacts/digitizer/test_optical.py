@@ -9,7 +9,7 @@ import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -38,10 +38,14 @@ from cmm_uq.artefacts.optical.ballbar import ScannedBallbar, observe
 from cmm_uq.artefacts.optical.balls import scanned_ball
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
+from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model import Noise, RecordingModel
+from cmm_uq.machine.model.artefact_doubt import causes_of, taken_as_exact
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.maths.geometry.feature import BallForm
 from tests.app.cli.process import run
 from tests.artefacts.digitizer.aligned import turned
+from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
 
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
@@ -302,3 +306,22 @@ def test_a_plan_by_criterion_tells_offset_and_factors_from_fewer_bars(tmp_path: 
         scaled = own / np.outer(SIZES, SIZES)
         variance[name] = {"D": np.linalg.det(scaled) ** (1 / 9), "A": np.trace(scaled) / 9}[criterion]
     assert variance["chosen"] < 0.9 * variance["first"]
+
+
+def test_the_form_of_the_balls_is_in_u_and_without_it_no_tolerance_passes() -> None:
+    """A shift of either ball's centre by its form changes a length by its part along the bar; U was the same of any form."""
+    found = analysed("optical-ballbar-simulated")
+    bar = cast("ScannedBallbar", found.artefact)
+    (form,) = causes_of(bar, Circumstances())
+    ends = bar.ends()
+    along = (ends[:, 1] - ends[:, 0]) / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)[:, None]
+    each = [BallForm(5.08e-3).covariance(ball.directions)[:3, :3] for ball in bar.balls]
+    both = [along[i] @ (each[2 * i] + each[2 * i + 1]) @ along[i] for i in range(len(along))]
+    np.testing.assert_allclose(np.sum(form.common**2, axis=1), both, rtol=1e-9)
+    without = observe(found.job.facts.artefact.model_copy(update={"ball_form_um": 0.0}), found.job.points)
+    assert not causes_of(without, Circumstances())
+    used, u = np.ones(len(along), dtype=bool), 1e-3
+    assert [str(text) for text in taken_as_exact(without, used, along[:, 0], u)] == [
+        "The form of the balls is not stated"
+    ]
+    assert not taken_as_exact(bar, used, along[:, 0], u)

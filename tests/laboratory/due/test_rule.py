@@ -10,11 +10,12 @@ import pytest
 from pydantic import ValidationError
 
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.certificate.results.contents import head
 from cmm_uq.jobs.tables.machine import Recalibration
 from cmm_uq.laboratory.due.intervals import METHODS
 from cmm_uq.laboratory.due.rule import DAYS_A_MONTH, Rule
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.content import certificate_content
+from cmm_uq.laboratory.records.content import certificate_content, kind_of_entry
 from tests.laboratory.records.histories import certificate, moment
 
 FACTS: dict[str, Any] = {
@@ -35,6 +36,17 @@ def test_the_key_of_a_job_is_recorded_with_its_certificate(job: Path) -> None:
                                   named=str)  # fmt: skip
     recorded = content["machine"]["calibrate"]
     assert Rule.of(recorded) == Rule("fixed", 6, longest_months=9, stated=True)
+
+
+@pytest.mark.parametrize("interim", [True, False])
+def test_an_interim_check_of_which_only_results_are_left_begins_no_interval(interim: bool, job: Path) -> None:
+    text = (job / "job.toml").read_text(encoding="utf-8")
+    (job / "job.toml").write_text(
+        text.replace("[job]", f"[job]\ninterim = {str(interim).lower()}", 1), encoding="utf-8"
+    )
+    content = certificate_content(head(read_job(job)), None, command="report", folder="f", results_sha256="", files={},
+                                  named=str)  # fmt: skip
+    assert (content["interim"], kind_of_entry(content)) == (interim, "check" if interim else "report")
 
 
 def test_the_newest_certificate_rules_and_another_entry_leaves_it_alone(tmp_path: Path) -> None:

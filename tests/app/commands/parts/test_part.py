@@ -356,6 +356,7 @@ def test_temperatures_outside_of_the_calibrations_are_told() -> None:
     ("part", {"cte_per_k": 0.0}, "expansion of the part"),
     ("part", {"u_cte_per_k": 0.0}, ""),  # at 20 °C it acts on nothing
     ("stylus", {"u_diameter_um": 0.0, "lobing_um": 0.0}, "qualification of the styli"),
+    ("stylus", {"u_diameter_um": 0.0}, "qualification of the styli"),
     ("stylus", {"u_diameter_um": 0.0, "lobing_um": 0.0, "diameter_mm": 0.0}, ""),
 ])  # fmt: skip
 def test_a_decision_says_of_what_no_uncertainty_is_stated(table: str, changes: dict[str, float], lacks: str) -> None:
