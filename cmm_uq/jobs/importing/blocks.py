@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.importing.factors import LINE, RUN, hint, ways_of
+from cmm_uq.jobs.importing.factors import LINE, RUN, hint
 from cmm_uq.jobs.importing.format import (
     LENGTH,
     UNITS,
@@ -42,10 +42,11 @@ _MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
 _BETWEEN = r"[\s;,]+(?:[YZ]\s*[=:]?\s*)?"
 _PLACE = r"([+−-]?\d+(?:[SIGN]\d+)?)"
 _THREE = {s: re.compile(r"[^\d+−-]{0,20}?" + _BETWEEN.join([_PLACE] * 3).replace("SIGN", s), re.I) for s in ".,"}
-_FORMULA = re.compile(r"(?<=\S)\s*[=＝].*", re.DOTALL)  # that says how a column was computed
+_FORMULA = re.compile(r"(?<=\S)\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
+_MEASURED = 0.05  # figures printed finer are no planned places
 _POWER = 99  # of ten, beyond which a text is no figure
 WORD = re.compile(r"[^\W\d_]+")
 
@@ -102,7 +103,6 @@ class CutSheet:
         self.width = max(map(len, sheet.rows), default=0)
         self.figures = [[None if c == "" else figure(c, self.sign) for c in row] for row in sheet.rows]
         self.matched: set[str] = set()  # of what the job calls columns, what is there
-        self._targets: dict[int, list[int]] = {}
         self.places_of: dict[int, str] = {}  # of each row of figures, as LINE_PLACE has it
         self.blocks = self._titled(list(self._blocks()))
         self.block_of = {row: block for block in self.blocks for row in block.rows}
@@ -134,7 +134,7 @@ class CutSheet:
     def place(self, i: int) -> dict[str, tuple[float, ...]]:
         """Start, end and direction of a line, where a row gives three figures after a word for one of them."""
         text = " ".join(self.text(i, k) for k in range(len(self.sheet.rows[i])))
-        return {} if self.targets(i) else places_in(text, self.sign)
+        return places_in(text, self.sign)
 
     def unit_in(self, rows: Sequence[int], i: int) -> WrittenUnit | None:
         """The unit that every cell of a column has after its figure."""
@@ -143,7 +143,8 @@ class CutSheet:
 
     def other_quantity(self, row: int) -> bool:
         """Whether a row names a unit that is none of lengths."""
-        named = (unit_named(self.text(row, k)) for k, own in enumerate(self.figures[row]) if own is None)
+        texts = ((self.text(row, k), own is None) for k, own in enumerate(self.figures[row]))
+        named = (unit_named(text) if bare else (apart(text) or ("", None))[1] for text, bare in texts)
         return any(unit.sort != LENGTH for unit in named if unit is not None)
 
     def unit_beside(self, rows: Sequence[int]) -> WrittenUnit | None:
@@ -189,8 +190,6 @@ class CutSheet:
         counted = len(filled) == 2 and numbers == filled[1:] and (self.figures[i][filled[1]] or (0, 0))[1] >= 1
         if counted and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN):
             return "text"  # as Position;1 above a block
-        if self.targets(i):
-            return "text"
         if self._is_head(i) and i + 1 < len(self.sheet.rows):
             units = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i + 1] if cell != ""]
             below = i + 1 + (len(units) == 1 and i + 2 < len(self.sheet.rows))  # below a title
@@ -203,27 +202,6 @@ class CutSheet:
         beside = [[k for k, f in enumerate(own) if f is not None] for own in around]
         told = len(numbers) > 1 and all(k - 1 in texts for k in numbers) and numbers not in beside
         return "text" if told else "figures"
-
-    def targets(self, i: int) -> list[int]:
-        """Columns of a row of targets along an axis, below which deviations stand, there and back; none of another row."""
-        if i not in self._targets:
-            own = self.figures[i]
-            columns = [k for k, f in enumerate(own) if f is not None]
-            steps = np.diff([f[0] for f in own if f is not None])
-            in_turn = len(columns) > 2 and columns[0] > 0 and columns[-1] - columns[0] == len(columns) - 1
-            below, most = list[int](), 0.2 * np.abs(steps).min(initial=np.inf)
-            for j in range(i + 1, len(self.figures)) if in_turn and (np.all(steps > 0) or np.all(steps < 0)) else ():
-                figures = {k: f[0] for k, f in enumerate(self.figures[j]) if f is not None and k >= columns[0]}
-                if [*figures] != columns:
-                    break
-                below.append(j)
-                if max(map(abs, figures.values())) >= most:
-                    below.clear()
-                    break
-            small = len(below) > 1
-            ways = (ways_of([self.text(j, k) for j in below[:2]]) for k in range(columns[0] if small else 0))
-            self._targets[i] = columns if any(way is not None for way in ways) else []
-        return self._targets[i]
 
     def _blocks(self) -> Iterator[Block]:
         pending: list[int] = []
@@ -272,20 +250,39 @@ class CutSheet:
         return blocks
 
     def _places_beside(self, block: Block) -> dict[int, str]:
-        """Places of lines that stand in the columns of a table, once for the rows that follow."""
+        """Places of lines in columns beside lengths, once for the rows that follow: by words, else below X, Y, Z twice."""
         columns: dict[str, list[int]] = {"start": []}
         for i, path in enumerate(block.paths):
             if any(self.figure(row, i) for row in block.rows):
                 for name in [name for _, name in _named_places(" ".join(path))][:1]:
                     columns.setdefault(name, []).append(i)
-        found, last = dict[int, str](), ""
         other = next((name for name in ("end", "direction") if len(columns.get(name, ())) == 3), "")
-        for row in block.rows if other and len(columns["start"]) == 3 else ():
-            figures = (self.figure(row, i) for i in (*columns["start"], *columns[other]))
-            own = [repr(figure[0]) for figure in figures if figure]
+        if other and len(columns["start"]) == 3:
+            return self._filled_places(block, (*columns["start"], *columns[other]), other)
+        axes = [(i, path[-1].strip().upper()) for i, path in enumerate(block.paths) if path]
+        six = [i for i, text in axes if len(text) == 1 and text in "XYZ"]
+        fine = any((self.figure(row, i) or (0, 1))[1] < _MEASURED for row in block.rows for i in six)
+        if fine or "".join(text for i, text in axes if i in six) != "XYZXYZ":
+            return {}  # or measured balls
+        found = self._filled_places(block, six, "end")
+        return found if any(self._as_far(found, i) for i in range(self.width) if i not in six) else {}
+
+    def _filled_places(self, block: Block, six: Sequence[int], other: str) -> dict[int, str]:
+        found, last = dict[int, str](), ""
+        for row in block.rows:
+            own = [repr(figure[0]) for figure in (self.figure(row, i) for i in six) if figure]
             last = f"{','.join(own[:3])} {other} {','.join(own[3:])}" if len(own) == 6 else last
             found |= {row: last} if last else {}
         return found
+
+    def _as_far(self, places: Mapping[int, str], i: int) -> bool:
+        """Whether starts and ends are as far apart as the longest of the lengths in a column that were measured there."""
+        longest: dict[str, float] = {}
+        for row, place in places.items():
+            longest[place] = max(longest.get(place, 0.0), (self.figure(row, i) or (0.0,))[0])
+        far = {place: np.array([float(one) for one in place.replace(" end ", ",").split(",")]) for place in longest}
+        apart = {place: float(np.linalg.norm(own[3:] - own[:3])) for place, own in far.items()}
+        return bool(far) and all(0.3 * apart[place] < own <= 1.02 * apart[place] + 1 for place, own in longest.items())
 
     def _titles(self, row: int) -> dict[str, str]:
         """Titles in a row of text, by the word that each begins with; without one where it has nothing else."""
@@ -296,7 +293,7 @@ class CutSheet:
         pairs = _PAIRS.split(text)
         parts = pairs if all(":" in pair for pair in pairs) else [text]
         parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
-        titles = {(first[0].casefold() if (first := WORD.search(part)) else part): part for part in parts}
+        titles = {(_begun(first[0]) if (first := WORD.search(part)) else part): part for part in parts}
         return {**titles, "": text} if len(cells) == 1 or placed else titles
 
     def _head(self, pending: Sequence[int], numbers: Sequence[int]) -> list[int]:
@@ -319,7 +316,7 @@ class CutSheet:
             # the last of them stands over all that follow
             grouped = len(filled) > 2 and filled == [*range(len(filled))]
             ahead = head and ((2 * filled[-1] < numbers[-1] and not grouped) or texts[0].endswith(":") or filled == [0])
-            if apart or ahead or (any(f is not None and f[1] < 1 for f in self.figures[row]) and not self.targets(row)):
+            if apart or ahead or any(f is not None and f[1] < 1 for f in self.figures[row]):
                 break
             head.insert(0, row)
         return head
@@ -336,6 +333,11 @@ class CutSheet:
                     texts[k] = texts[k] or (texts[k - 1] if below[k] and not begun[k] else "")
             levels.append(texts)
         return [[level[k] for level in levels] for k in range(self.width)]
+
+
+def _begun(word: str) -> str:
+    """How a title begins; all letters of axes alike."""
+    return word.casefold() if len(word) > 1 or not word.isascii() else "x"
 
 
 def _named_places(text: str) -> Iterator[tuple[re.Match[str], str]]:

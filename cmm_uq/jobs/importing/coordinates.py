@@ -15,10 +15,10 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet, heading
-from cmm_uq.jobs.importing.factors import hint, ways_of
+from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import without_unit
-from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said, said_by, words_above
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said_by, words_above
 
 _MOST = 0.8  # of figures: where fewer are there, they may be of something else
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
@@ -294,76 +294,3 @@ def _threes(labels: Sequence[Mapping[tuple[str, str], str]]) -> bool:
         counts = key[0] != "block" and of != "run" and (of is not None or not all(one.isdecimal() for one in own))
         named = named or (counts and own[::3] == own[1::3] == own[2::3] and (len({*own}) > 1 or len(own) == 3))
     return named
-
-
-def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
-    """Deviations at targets along an axis, there and back."""
-    columns = columns_in(grid, blocks, rows)
-    if blocks[0].head and (across := grid.targets(blocks[0].head[-1])):
-        return _across(grid, rows, columns, across, blocks[0].head[-1])
-    ends = [c for c in columns if c.role in ("target", "nominal") and np.ptp(c.values[np.isfinite(c.values)]) > 1]
-    target = min(ends, key=lambda c: c.counts, default=None)  # and not their numbers
-    if target is None or not np.isfinite(target.values[0]):
-        return None
-    values = target.downwards
-    beside = [c for c in columns if c is not target and c.role in (None, "deviation", "measured") and c.may_be_length]
-    small = [c for c in beside if (c.step < 1 or _way(c.heading)) and not like(c.values + 1000, values + 1000)]
-    small = _of_runs(small)
-    directed = [c for c in small if _way(c.heading)] or [c for c in small if c.role == "deviation"]
-    source = directed or small  # the others are reversals, spreads and what was recorded beside them
-    reading = SheetReading("runs", unit=target.unit, small=next((c.unit for c in source if c.unit), None))
-    if not any(_way(c.heading) for c in source) and (reached := _reached(columns, target, values, source)):
-        source, reading.positions = reached, True
-    if not source or any(a.heading == b.heading and not _way(a.heading) for a, b in combinations(source, 2)):
-        return None  # or of two instruments
-    reading.taken = {"target": [target], "reading_um": source}
-    reading.collect(grid, rows, columns)
-    for k, row in enumerate(rows):
-        for c in source:
-            if np.isfinite(c.values[k]):
-                reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
-            else:
-                reading.blank.append((row, c.i))
-    return reading if any(ways_of(label.values) is not None for label in reading.every_label) else None
-
-
-def _reached(
-    columns: Sequence[FigureColumn], target: FigureColumn, values: Floats, deviations: Sequence[FigureColumn]
-) -> list[FigureColumn]:
-    """Positions that were reached, as deviations from their targets, where no deviation stands beside them."""
-    near = [c for c in columns if c is not target and c.role in (None, "measured", "reference")]
-    near = [c for c in near if c.may_be_length and c.step < 1 and like(c.values, values, _OFF_MM)]
-    near = [c for c in near if np.nanmax(np.abs(values)) > 10 * _OFF_MM]
-    given = any(d.agrees(c, target, f) for d in deviations for c in near for f in d.factors(c))
-    return [] if given else [replace(c, values=c.values - values) for c in _of_runs(near)]
-
-
-def _of_runs(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
-    """Columns that are no mean of others of the same sense of travel."""
-    found = []
-    for c in columns:
-        ways = [(o, ways_of([o.heading, c.heading])) for o in columns if o is not c]
-        if not c.sums_up([o for o, of in ways if of is None or of[0] == of[1]]):
-            found.append(c)
-    return found
-
-
-def _across(
-    grid: CutSheet, rows: Sequence[int], columns: Sequence[FigureColumn], across: Sequence[int], head: int
-) -> SheetReading | None:
-    """Deviations below the targets that stand above them, a way and a run in each row."""
-    source = [c for c in columns if c.i in across]
-    labels = {row: [grid.text(row, k) for k in range(across[0])] for row in rows}
-    own = [row for row in rows if said(labels[row]) != "summary" and any(map(_way, labels[row]))]
-    reading = SheetReading("runs", taken={"target": source, "reading_um": source})
-    reading.collect(grid, own, columns)
-    for k, row in enumerate(own):
-        for c in source:
-            if (target := grid.figure(head, c.i)) and (figure := grid.figure(row, c.i)):
-                reading.add(row, k, c, [c], (target[0], figure[0]))
-    return reading if len(reading.figures) == len(own) * len(across) else None
-
-
-def _way(text: str) -> bool:
-    """Whether a text names a sense of travel."""
-    return any(ways_of([text, other]) is not None for other in "+-")

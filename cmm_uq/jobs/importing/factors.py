@@ -8,14 +8,15 @@ nominal length fixes counts lengths. Nothing is taken where two observations wou
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from cmm_uq.base.points import Ints
-from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
 LINE, RUN, POINT = "line", "run", "point"
@@ -43,40 +44,68 @@ Counted = tuple[Label, Ints, str | None]  # a label, the number of its value for
 
 def ways_of(values: Sequence[str]) -> list[int] | None:
     """Sense of travel that labels name, +1 or −1; ``None`` where one of them names none, or all the same."""
-    found: list[int] = []
-    for value in values:
-        text, words = value.strip(" ()[]"), plain_words(value)
-        own = {_MARKS[c] for c in text if c in "↑↓→←"}
-        ends = (text[-1:], text[:1] if not text[1:2].isdigit() else "")
-        own |= set() if own else {_MARKS[c] for c in ends if c in _MARKS}
-        for name, sense in (("forward", 1), ("backward", -1)):
-            asian = [one for one in words_of("ways")[name] if len(one) > 1 and unspaced(one)]
-            if any(word in words_of("ways")[name] or any(one in word for one in asian) for word in words):
-                own.add(sense)
-        if len(own) != 1:
-            return None
-        found += own
-    return found if len({*found}) > 1 else None
+    known = {value: way_of(value) for value in {*values}}
+    first, *others = known.values()
+    if len(others) == 1 and not first * others[0]:  # of two the one says the other
+        known = {value: way or -(first + others[0]) for value, way in known.items()}
+    return [known[value] for value in values] if {*known.values()} == {1, -1} else None
+
+
+@lru_cache(maxsize=4096)
+def way_of(value: str) -> int:
+    """Sense of travel that a label names; 0 where it names none."""
+    text, words = value.strip(" ()[]"), plain_words(value)
+    own = {_MARKS[c] for c in text if c in "↑↓→←"}
+    ends = (text[-1:], text[:1] if not text[1:2].isdigit() else "")
+    own |= set() if own else {_MARKS[c] for c in ends if c in _MARKS}
+    for name, sense in (("forward", 1), ("backward", -1)):
+        asian = [one for one in words_of("ways")[name] if len(one) > 1 and unspaced(one)]
+        if any(word in words_of("ways")[name] or any(one in word for one in asian) for word in words):
+            own.add(sense)
+    return own.pop() if len(own) == 1 else 0
+
+
+def senses(labels: Sequence[Label], targets: Ints) -> list[int] | None:
+    """Sense of travel by the label that names both as often at nearly each target; ``None`` where none does."""
+    for own in map(ways_of, (label.values for label in labels)):
+        if own is not None:
+            both = Counter[int]()
+            for target, way in zip(targets.tolist(), own, strict=True):
+                both[target] += way
+            if sum(n == 0 for n in both.values()) >= 0.8 * len(both):
+                return own
+    return None
 
 
 def counted(label: Label, *, lengths: bool) -> str | None:
     """What a label counts, by the words above it, else by those in it."""
-    if label.sort == "column" and (of := hint(label.words, lengths=lengths)) and (of != RUN or _counting(label.values)):
+    if label.sort == "column" and (of := hint(label.words, lengths=lengths)) and (of != RUN or counting(label.values)):
         return of
     if label.sort == "title" and not label.words:
         every = {hint(value, lengths=lengths) for value in {*label.values}}
-        return every.pop() if len(every) == 1 else None
+        return _counting_title(label, every.pop() if len(every) == 1 else None)
     if label.sort == "part" and {*label.values} <= LETTERS:
         return POINT
     words = (label.words, label.values[0]) if label.sort in ("title", "part") else label.values[:1]
     found = next((found for text in words if (found := hint(text, lengths=lengths))), None)
-    alike = label.sort == "head" and _counting(label.values)
-    return RUN if alike and found not in (LINE, POINT) else found
+    alike = label.sort == "head" and counting(label.values)
+    return RUN if alike and found not in (LINE, POINT) else _counting_title(label, found)
 
 
-def _counting(values: Sequence[str]) -> bool:
+def _counting_title(label: Label, of: str | None) -> str | None:
+    """What a label counts; a title, or a part of one, runs only by numbers."""
+    numbered = of != RUN or (counting(label.values) and all("0" in numberless(value) for value in label.values))
+    return of if label.sort not in ("title", "part") or numbered else None
+
+
+def counting(values: Sequence[str]) -> bool:
     """Whether labels are alike but for their number."""
-    return len({re.sub(r"\d+", "0", value) for value in values}) == 1
+    return len({*map(numberless, values)}) == 1
+
+
+def numberless(text: str) -> str:
+    """A text with one figure for each number, of whatever form."""
+    return re.sub(r"\d+", "0", unicodedata.normalize("NFKC", text))
 
 
 def hint(text: str, *, lengths: bool) -> str | None:
@@ -91,7 +120,7 @@ def hint(text: str, *, lengths: bool) -> str | None:
         for k, word in enumerate(words)
         for name, those in ((LINE, line), (POINT, point), (RUN, run))
         for one in those
-        if one == word or (len(one) > 1 and unspaced(one) and one in word)
+        if one == word or (len(one) > 1 and unspaced(one) and word.endswith(one))  # what is meant stands last
     ]
     exact = [fit for fit in fits if fit[0] == int(fit[0])]
     if fits:
@@ -159,7 +188,11 @@ def varying(labels: Sequence[Label], *, lengths: bool) -> list[Counted]:
         own = codes(label.values)
         if own.max(initial=0) and "" not in label.values:
             before, of = seen.get(own.tobytes()), counted(label, lengths=lengths)
-            if before is None or (before[2] is None and of is not None):
+            if (
+                before is None
+                or (before[2] is None and of is not None)
+                or (before[2] == POINT and label.sort == "column" and hint(label.words, lengths=lengths) == LINE)
+            ):
                 seen[own.tobytes()] = label, own, of
     return [*seen.values()]
 
@@ -180,65 +213,3 @@ def numbered_runs(values: Sequence[str]) -> Ints:
     if all(len(one) == 1 for one in numbers) and len({*values}) == len({one[0] for one in numbers}):
         return np.array([int(one[0]) for one in numbers])
     return codes(values) + 1
-
-
-def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
-    """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
-    count, several, found = len(reference), bool(reference.max(initial=0) > 0), varying(labels, lengths=True)
-    if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
-        found = [(f[0], f[1], RUN if f[0].sort == "head" and _counting(f[0].values) else f[2]) for f in found]
-    plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
-    run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
-    line: list[Counted] = []
-    for one in sorted((f for f in plain if f[2] == LINE), key=lambda f: (f[0].sort == "part", -f[1].max())):
-        if not line or not fixes(together(*(f[1] for f in line)), one[1]):
-            line.append(one)
-
-    def apart(*more: Ints) -> int:
-        """How many of the lengths are told apart."""
-        return int(together(reference, *(f[1] for f in line), *([run[1]] if run else []), *more).max()) + 1
-
-    rank = {sort: k for k, sort in enumerate(("title", "sheet", "head", "block", "part", "column"))}
-    others = [f for f in plain if f[2] in (None, POINT)]
-    for one in sorted(others, key=lambda f: (f[2] == POINT, rank[f[0].sort], f[1].max())):
-        if apart() == count or apart(one[1]) == apart():
-            continue
-        whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
-        if run is None and any(f[2] == LINE for f in found) and _digits(one[0]):
-            run = one
-        elif line or whole or one[0].sort != "column":
-            line.append(one)
-        else:
-            fix = f'Say by which column: columns = {{ line = "{one[0].words}" }}'
-            raise NotReadError("nothing says which lengths lie on one line", where=place, fix=fix)
-    # else one length on each line, which are named and not counted
-    line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
-    key = together(reference, *(f[1] for f in line))
-    if apart() < count if run is not None else len({*Counter(key.tolist()).values()}) > 1:
-        what = "lengths of one line and one run have the same nominal length"
-        fix = 'Say what tells them apart: columns = { line = "…", repeat = "…" }'
-        raise NotReadError(what, where=place, fix=fix)
-    names = [" ".join(dict.fromkeys(parts)) for parts in zip(*(f[0].values for f in line), strict=True)]
-    titles = [one for one in labels if one.sort == "title" and counted(one, lengths=True) == LINE]
-    titled = [one.values[0] for one in labels if one.values[0] and (one.sort == "sheet" or one in titles)]
-    numbers = in_turn(key) if run is None else numbered_runs(run[0].values)
-    used = [f[0].words for f in (*line, *([run] if run else []))]
-    return names or [titled[-1] if titled else "1"] * count, numbers, used
-
-
-def _one_run(labels: Sequence[Label], runs: Sequence[Counted], place: str) -> Counted | None:
-    """The label that counts runs; an error where two do, each in its own way."""
-    if unnamed := [label.words for label in labels if label.sort == "unnamed"]:
-        raise NotReadError("no line is named", where=unnamed[0], fix="Complete the row")
-    run = min(runs, key=lambda f: f[1].max(), default=None)
-    heads = next((len({*f[0].values}) for f in runs if f[0].sort == "head"), 0)
-    counting = [one for one in labels if one.sort == "column" and _counting(one.values)]
-    columns = [one.words for one in counting if hint(one.words, lengths=True) == RUN]
-    if (heads and columns) or (run is not None and any(not fixes(run[1], f[1]) for f in runs)):
-        what = f"{(columns or [runs[0][0].words])[0]!r} counts runs, and so do {heads or 'other'} columns"
-        raise NotReadError(what, where=place, fix="Name one of them alone: columns")
-    return run
-
-
-def _digits(label: Label) -> bool:
-    return all(value.strip().isdigit() for value in label.values)

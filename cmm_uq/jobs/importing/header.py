@@ -66,7 +66,7 @@ def words_of(table: str) -> Mapping[str, frozenset[str]]:
 
 
 _WORDS = re.compile(r"[^\W\d_\u3040-\u9fff]+|[\u3040-\u9fff]+|\d+")  # Japanese beside a letter is a word of its own
-_ORDINAL = str.maketrans("", "", "ªº°")  # after a number
+_ORDINAL = str.maketrans("łøđı", "lodi", "ªº°")  # letters that are none with an accent; signs after a number
 _COLUMNS = {phrase: column for column, phrases in words_of("columns").items() for phrase in phrases}
 _AXIS = words_of("axis")  # words beside the letter of an axis, those that leave it a coordinate among them
 _NOMINAL, _SMALL, _POINT = _AXIS["nominal"], _AXIS["small"], words_of("columns")["point"]

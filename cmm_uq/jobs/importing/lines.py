@@ -31,8 +31,8 @@ from cmm_uq.jobs.importing.factors import (
     in_turn,
     numbered_runs,
     parts_of,
+    senses,
     together,
-    ways_of,
 )
 from cmm_uq.jobs.importing.format import (
     LINE_PLACE,
@@ -228,6 +228,7 @@ class Rtl(TextReport):
 
 
 _MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
+_FINEST_UM, _LEAST_UM = 0.002, 0.05  # finer and smaller than machines are known in µm: these are in the unit of targets
 
 
 def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
@@ -239,22 +240,27 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     unit = reading.unit or unit_elsewhere(sheets, small=False) or UNITS["mm"]
     small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
     small = small or length_named(sheets[0].unit or "")
-    if small is None and np.abs(figures[:, 1]).max() < _MILLIMETRES:
+    most, finest = np.abs(figures[:, 1]).max(), min(c.step for c in reading.taken["reading_um"])
+    if small is None and reading.unit is not None and finest < _FINEST_UM and most < _LEAST_UM:
+        small = reading.unit
+    if small is None and most < _MILLIMETRES:
         fix = "Write it above them: (µm) or (mm)"
         raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
     target = units.converted(figures[:, 0], unit, "x_mm")
     deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um")
-    named = ([axis_in(f"{label.words} {value}") for value in label.values] for label in labels)
+    named = [
+        [find(f"{label.words} {value}") for value in label.values] for find in (axis_in, _letter_in) for label in labels
+    ]
     axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
-    ways = next((found for label in labels if (found := ways_of(label.values)) is not None), None)
+    ways = senses(labels, codes(target.tolist()))
     parts = [part for label in labels for part in (label, *parts_of(label))]
     run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
     key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
     numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
     if ways is None:  # by the order of their targets; none where all are listed in one order
         ends = {n: target[numbers == n][[0, -1]] for n in np.unique(numbers).tolist()}
-        senses = {n: int(np.sign(last - first)) for n, (first, last) in ends.items()}
-        ways = [senses[n] if len({*senses.values()}) > 1 else 0 for n in numbers.tolist()]
+        turns = {n: int(np.sign(last - first)) for n, (first, last) in ends.items()}
+        ways = [turns[n] if len({*turns.values()}) > 1 else 0 for n in numbers.tolist()]
     runs: dict[tuple[str, int, int], AxisRun] = {}
     rows = zip(target.tolist(), deviation.tolist(), reading.lines, strict=True)
     for one, row in zip(zip(axes, ways, numbers.tolist(), strict=True), rows, strict=True):
@@ -281,6 +287,12 @@ def _angle_in(sheets: Sequence[Sheet]) -> str | None:
 def axis_in(text: str) -> str:
     found = _AXIS_NAME.search(text)
     return (found[1] or found[2]).upper() if found else ""
+
+
+def _letter_in(text: str) -> str:
+    """The one letter of an axis that stands alone in a text."""
+    found = {*re.findall(r"(?<![^\W_])[XYZ](?![^\W_])", text)}
+    return found.pop() if len(found) == 1 else ""
 
 
 def _axis_of(sheets: Sequence[Sheet]) -> str:

@@ -24,6 +24,7 @@ from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest, misnamed
 from cmm_uq.jobs.importing.answers import head_of
+from cmm_uq.jobs.importing.blocks import SMALL
 from cmm_uq.jobs.importing.columns import columns_of
 from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import (
@@ -292,7 +293,7 @@ def _with_unit(sheet: Sheet) -> Sheet:
         if sum(cell != "" and is_number(cell) for cell in row) > 1:
             break
         match = _UNIT_LINE.search(";".join(map(str, row)))
-        if match and (unit := length_named(match[1].strip("[]().,;"))):
+        if match and (unit := length_named(match[1].strip("[]().,;"))) and unit.name not in SMALL:
             return replace(sheet, unit=unit.name)
     return sheet
 

@@ -74,6 +74,12 @@ class FigureColumn:
         return bool(own[0] in (0, 1) and np.array_equal(own, np.arange(own[0], own[0] + len(own))))
 
     @property
+    def round(self) -> bool:
+        """Whether its figures are whole, to two digits behind the point at most in none of them."""
+        own = self.values[np.isfinite(self.values)]
+        return bool(np.all(np.abs(own - np.round(own, 1)) < 1e-6))
+
+    @property
     def downwards(self) -> Floats:
         """Each figure in the rows below it too that have none."""
         there = np.flatnonzero(np.isfinite(self.values))
@@ -101,14 +107,18 @@ class FigureColumn:
         """By what deviations are multiplied to be in the unit of lengths."""
         if self.unit is not None and length.unit is not None and self.unit.sort == length.unit.sort == LENGTH:
             return ((self.unit.up / self.unit.down) / (length.unit.up / length.unit.down),)
-        return (1.0, 1e-3, 1e-6)
+        return (1.0, 1e-3, 1e-4, 1e-6, *((1 / 25.4, 1 / 25400) if length.unit is None or self.unit is None else ()))
+
+    def slack(self, measured: FigureColumn, reference: FigureColumn, factor: float) -> float:
+        """By what deviations differ from measured minus reference where all are rounded to their printed digits."""
+        step = self.step * factor + sum(one.step for one in (measured, reference) if one.step < _COARSE)
+        return 0.525 * step + 1e-9
 
     def agrees(self, measured: FigureColumn, reference: FigureColumn, factor: float) -> bool:
         """Whether deviations are measured minus reference to the last printed digits."""
-        step = self.step * factor + sum(one.step for one in (measured, reference) if one.step < _COARSE)
         away = np.abs(measured.values - reference.values - self.values * factor)
         away = away[np.isfinite(away)]
-        return away.size > 0 and bool((away <= 0.525 * step + 1e-9).all())
+        return away.size > 0 and bool((away <= self.slack(measured, reference, factor)).all())
 
     def sums_up(self, others: Sequence[FigureColumn], *, worst: bool = False) -> bool:
         """Whether it is the mean, range or standard deviation of others; with ``worst`` also the largest of them.
@@ -150,12 +160,14 @@ class SheetReading:
     beside_lengths: bool = (
         False  # whether they are places that stand beside something else, as where a length was measured
     )
+    summaries: list[int] = field(default_factory=list)  # rows of another table, of means of this one
     beside: list[Labels] = field(default_factory=list)  # of each row
     further: dict[str, Floats] = field(default_factory=dict)
 
     @property
-    def columns(self) -> set[int]:
-        return {c.i for name, own in self.taken.items() for c in own if name not in ("reference_mm", "target")}
+    def source(self) -> list[FigureColumn]:
+        """Columns of what was measured."""
+        return [c for name, own in self.taken.items() for c in own if name not in ("reference_mm", "target")]
 
     @property
     def called(self) -> bool:
@@ -312,23 +324,25 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
 
 def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str] | None:
     """Rows with figures beside those that are read of a sheet; ``None`` where one of them may be measured."""
-    rows, columns = {r for one in readings for r in one.rows}, {i for one in readings for i in one.columns}
+    rows, columns = {r for one in readings for r in one.rows}, {c.i for one in readings for c in one.source}
     taken = rows | {r for one in readings for r in one.others}
+    summed = {r for one in readings for r in one.summaries}
     heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
     cells = (cell for row in taken for cell in grid.sheet.rows[row])
     if any(isinstance(cell, str) and _SEVERAL.fullmatch(cell.strip()) for cell in cells):
         return None  # cells that were not cut apart
     told = []
-    for row in range(min(taken), len(grid.sheet.rows)):
+    first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
+    for row in range(first, len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and row < last and row not in heads:
-            first = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
-            if hint(first, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
+            text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
+            if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
                 told.append(header.shown(grid.sheet, row, header.REMARK))
         if row in taken or grid.kinds[row] != "figures":
             continue
         figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in columns)]
         within = row < last or grid.sheet.lines[row] - grid.sheet.lines[last] == row - last  # without a gap
-        if figures and within and not _explained(grid, row, figures, rows, columns):
+        if figures and within and row not in summed and not _explained(grid, row, figures, rows, columns):
             return None
         told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures else []
     blank = [cell for one in readings for cell in one.blank]
@@ -350,6 +364,9 @@ def _explained(
     alone = len(figures) < 2 or {*block}.isdisjoint(rows)
     if (alone and {*columns}.isdisjoint(figures)) or grid.other_quantity(row):
         return True
+    whole = [f is not None and f[1] >= 1 for f in (grid.figure(row, k) for k in figures)]
+    if len(figures) < 2 and all(whole) and not any((grid.figure(r, figures[0]) or (0, 1))[1] >= 1 for r in rows):
+        return True  # a count of something, below figures with digits behind the point
     if alone and is_void([text for k in figures for text in grid.path(row, k)], "feature"):
         return True
     for k in {*figures} & {*columns}:

@@ -15,6 +15,7 @@ import re
 import warnings
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import compress, islice, pairwise
 from typing import Any
@@ -35,7 +36,8 @@ _BLANK = " "  # cells of a text without separators, by where they stand
 _TITLES: dict[str, Text] = {
     ",": say("comma"), ";": say("semicolon"), "\t": say("tab"), "|": say("bar"), _BLANK: say("blanks"),
 }  # fmt: skip
-_TOKEN, _PHRASE = re.compile(r"\S+"), re.compile(r"\S+(?: \S+)*")
+_TOKEN, _PHRASE = re.compile(r"(?:(?![:=|]+(?=\s))\S+)"), re.compile(r"\S+(?: \S+)*")
+_BETWEEN = re.compile(r"(?<=\s)[:|](?=\s)")  # columns
 _POINT = re.compile("[.,]")
 _WIDE = re.compile(
     "[\u1100-\u115f\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe4f\uff00-\uff60\uffe0-\uffe6]"
@@ -117,14 +119,18 @@ def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:
 def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
     """Cells of lines by where they stand: columns are where figures stand below each other, heads go to the nearest."""
     lines = [_WIDE.sub(rf"\g<0>{_HELD}", line.expandtabs()) for line in lines]
-    tokens = [[(m.start(), m.end(), m[0]) for m in _TOKEN.finditer(line)] for line in lines]
-    counted = [_is_row([text for _, _, text in own], line) for own, line in zip(tokens, lines, strict=True)]
-    spans: list[tuple[int, int]] = []  # where tokens stand, those that overlap together
-    for start, end, _ in sorted(t for own, is_row in zip(tokens, counted, strict=True) if is_row for t in own):
-        if spans and start < spans[-1][1]:
-            spans[-1] = (spans[-1][0], max(spans[-1][1], end))
-        else:
-            spans.append((start, end))
+    lines = [_BETWEEN.sub(" ", line) if len(_BETWEEN.findall(line)) > 1 else line for line in lines]
+    tokens = [_row_of(line) for line in lines]
+    counted = [*map(bool, tokens)]
+    spans: list[tuple[int, int]] = []  # where tokens stand, by the most common rows first
+    sizes = Counter(map(len, filter(None, tokens)))
+    for size, rows in sizes.most_common():
+        for start, end in _merged((a, b) for own in tokens if len(own) == size for a, b, _ in own):
+            over = [span for span in spans if start < span[1] and span[0] < end]
+            if len(over) < 2 or 5 * rows > sizes.most_common(1)[0][1]:  # else as the name of a summary does
+                spans = [span for span in spans if span not in over]
+                spans.append((min([start, *(a for a, _ in over)]), max([end, *(b for _, b in over)])))
+    spans = _merged(spans)
     for own, is_row, line in zip(tokens, counted, lines, strict=True):
         phrases = own if is_row else [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line)]
         if not is_row and len(phrases) < 2 and (not phrases or phrases[0][0] < 8):
@@ -135,11 +141,30 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
             continue
         cells = [""] * max(1, len(spans))
         for start, end, text in phrases:
-            over = (k for k, (a, b) in enumerate(spans) if a < end and start < b)
             nearest = min(range(len(spans)), key=lambda k: abs(spans[k][1] - end), default=0)
-            k = next(over, nearest)
+            k = next((k for k, (a, b) in enumerate(spans) if a < end and start < b), nearest)
             cells[k] = f"{cells[k]} {text.replace(_HELD, '')}".strip()
         yield cells
+
+
+def _row_of(line: str) -> list[tuple[int, int, str]]:
+    """Where the words of a row of figures stand, or its phrases, of which the last is a figure; none of another line."""
+    for part in (_TOKEN, _PHRASE):
+        own = [(m.start(), m.end(), m[0]) for m in part.finditer(line)]
+        if _is_row([text for *_, text in own], line) and (part is _TOKEN or _NUMBER.fullmatch(own[-1][2])):
+            return own
+    return []
+
+
+def _merged(spans: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Spans in order, those that overlap together."""
+    found: list[tuple[int, int]] = []
+    for start, end in sorted(spans):
+        if found and start < found[-1][1]:
+            found[-1] = (found[-1][0], max(found[-1][1], end))
+        else:
+            found.append((start, end))
+    return found
 
 
 def _is_row(texts: Sequence[str], line: str) -> bool:

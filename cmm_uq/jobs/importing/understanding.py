@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import permutations
 
 import numpy as np
 
@@ -21,17 +22,22 @@ from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
-from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes, runs_in
-from cmm_uq.jobs.importing.factors import codes, hint, lines_and_runs
+from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
+from cmm_uq.jobs.importing.factors import codes, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import places
 from cmm_uq.jobs.importing.header import Header, is_summary
-from cmm_uq.jobs.importing.length_columns import lengths_in
+from cmm_uq.jobs.importing.lengths.evidence import sums_of
+from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
+from cmm_uq.jobs.importing.lengths.line_labels import lines_and_runs
+from cmm_uq.jobs.importing.lengths.run_columns import runs_in
+from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import MeasuredLengths, axis_in
 from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, rows_left_out, said_by
 
 _COMPARED = 5000  # points of sheets
+_SAME_MM, _OFF_MM = 1e-4, 0.1  # of places of one line, rounded
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+")
 Found = tuple[SheetReading, CutSheet]
@@ -68,14 +74,15 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     problem: NotReadError | None = None
     upright = [*map(formats.stacked, sheets)]
     for sheet in upright:
-        own: list[Found] = []
-        both = (sheet, formats.transposed(sheet)) if len(sheet.rows) <= ROWS_MOST else ()
-        for one in filter(None, both):
+        for read in _ways_of(sheet, keys, where):
             try:
-                own = own or _of_sheet(one, keys, where, turned=one is not sheet)
+                own = _of_sheet(*read)
             except NotReadError as error:
-                problem = problem or error
-        found += [one for one in own if problem is None or one[0].kind != "points" or one[1].sheet is sheet]
+                problem, own = problem or error, []
+            own = [one for one in own if problem is None or one[0].kind != "points" or not read[1]]
+            if own:
+                found += own
+                break
     chosen = _chosen(found)
     if not chosen and problem is not None:
         raise problem
@@ -119,6 +126,17 @@ def _elsewhere(chosen: Sequence[Found]) -> bool:
     return len({*zip(sheets.tolist(), at.tolist(), strict=True)}) == int(at.max()) + 1
 
 
+def _ways_of(sheet: Sheet, keys: Mapping[str, Sources], where: str) -> Iterator[tuple[CutSheet, bool]]:
+    """A sheet as it is, then with what stands across it turned."""
+    if len(sheet.rows) <= ROWS_MOST:
+        grid = CutSheet(sheet, keys, where)
+        yield grid, False
+        if (other := turned(grid)) is not None:
+            yield CutSheet(other, keys, where), True
+        if (other := formats.transposed(sheet)) is not None:
+            yield CutSheet(other, keys, where), True
+
+
 def _label(chosen: Sequence[Found], elsewhere: Mapping[str, str]) -> None:
     """Sheet of every observation, and where its line lies by its own sheet, else by its name in another."""
     for reading, grid in chosen:
@@ -140,6 +158,10 @@ def _chosen(found: Sequence[Found]) -> list[Found]:
     chosen = [one for one in found if one[0].kind == kind]
     # deviations of lengths that are there, and small tables beside a large one, are the same again
     chosen = [one for one in chosen if not one[0].deviations] or chosen
+    for one, other in permutations(chosen, 2):
+        if one[1] is other[1] and sums_of(one[0].source, other[0].source):
+            other[0].summaries, one[0].figures = [*other[0].summaries, *one[0].rows], []
+    chosen = [one for one in chosen if one[0].figures]
     return [one for one in chosen if len(one[0].figures) * 8 > max(len(other[0].figures) for other in chosen)]
 
 
@@ -177,8 +199,8 @@ def _tabled_places(sheets: Sequence[Sheet], others: Collection[str]) -> dict[str
     return {name: places.pop() for name, places in found.items() if len(places) == 1}
 
 
-def _of_sheet(sheet: Sheet, keys: Mapping[str, Sources], where: str, *, turned: bool) -> list[Found]:
-    grid, found = CutSheet(sheet, keys, where), []
+def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
+    sheet, found = grid.sheet, list[Found]()
     problem: NotReadError | None = None
     for blocks, rows in each(grid):
         usable = [
@@ -186,7 +208,7 @@ def _of_sheet(sheet: Sheet, keys: Mapping[str, Sources], where: str, *, turned: 
         ]
         own = _layout(grid, usable) if usable else []
         readings: list[SheetReading] = []
-        places = (*(() if turned else (rows_of_axes,)), points_in) if {*keys} <= {*WHOLE} else ()
+        places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
         for read in (lengths + places if {*own} <= {*grid.places_of} else places + lengths) if own else ():
             try:
@@ -195,7 +217,9 @@ def _of_sheet(sheet: Sheet, keys: Mapping[str, Sources], where: str, *, turned: 
                 problem, reading = problem or error, None
             # of a turned sheet words must say which lengths, or targets, those that were measured are of
             if reading is not None and (
-                reading.called or not turned or (reading.kind == "points" and not reading.bare)
+                reading.called
+                or not across
+                or (bool(reading.checked) if reading.kind == "lengths" else reading.kind == "runs" or not reading.bare)
             ):
                 readings.append(reading)
                 # else they are places of lines or of features, or a few rows that were taken for others
@@ -216,9 +240,11 @@ def _layout(grid: CutSheet, rows: list[int]) -> list[int]:
     """Rows that have figures where most of them have."""
     fine = {k for row in rows for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1}
     signs = {row: frozenset(k for k in fine if grid.figure(row, k)) for row in rows}
-    common = Counter(k for own in signs.values() for k in own)
-    needed = {k for k, n in common.items() if n > 0.6 * len(rows)}
-    return [row for row in rows if not needed or len(signs[row] & needed) * 2 > len(needed)]
+    many = [own for own in signs.values() if len(own) > 1]
+    most = many if len(many) >= 0.4 * len(rows) else [*signs.values()]  # and not the second line of each
+    common = Counter(k for own in most for k in own)
+    needed = {k for k, n in common.items() if n > 0.6 * len(most)}
+    return [row for row in rows if len(signs[row] & needed) * 2 >= len(needed)]
 
 
 @dataclass
@@ -328,10 +354,17 @@ def _places(names: Sequence[str], reading: SheetReading, measured: Floats, unit:
         each = [np.array([[float(one) for one in part.split(",")] for part in (p[0], p[2])]) for p in parted]
         ways = [ends[1] - ends[0] if parts[1] == "end" else ends[1] for parts, ends in zip(parted, each, strict=True)]
         ways = [way / max(np.linalg.norm(way), 1e-9) for way in ways]
-        lines = [np.array([ends[0], way]) for ends, way in zip(each, ways, strict=True)]
-        if not each or len(each) < len(stated) or not all(np.allclose(one, lines[0], atol=1e-4) for one in lines):
+        if not each or len(each) < len(stated):
             continue
-        ends, which = max(zip(each, parted, strict=True), key=lambda one: float(np.linalg.norm(one[0][1] - one[0][0])))
+        far = max(range(len(each)), key=lambda k: float(np.linalg.norm(each[k][1] - each[k][0])))
+        reach = [
+            own[1] - own[0] if parts[1] == "end" else own[1] * _OFF_MM / _SAME_MM
+            for own, parts in zip(each, parted, strict=True)
+        ]
+        off = [float(np.linalg.norm(np.cross(ways[far], one))) for one in reach]
+        if any(np.abs(one[0] - each[0][0]).max() > _SAME_MM for one in each) or max(off) > _OFF_MM:
+            continue
+        ends, which = each[far], parted[far]
         longest = measured[own].max()
         if which[1] == "direction":
             ends[1] = ends[0] + ways[0] * longest * unit.down / unit.up

@@ -1,24 +1,33 @@
-"""Which columns of a table of lengths are calibrated, measured and deviations: what words leave open, arithmetic decides.
+"""Which columns of a table of lengths are calibrated, measured and deviations: figures decide, words what they leave open.
 
 Lengths stand in columns that are alike row by row. A deviation beside them must be measured minus reference, either way round,
-or the worst or the mean of several; what is a mean or a range of others is no run.
+or the worst or the mean of several; what is a mean, a range or a limit is no run.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading, unit_of
-from cmm_uq.jobs.importing.factors import hint
-from cmm_uq.jobs.importing.format import UNITS, NotReadError
-from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said, said_by, without_sums
+from cmm_uq.jobs.importing.factors import hint, numberless
+from cmm_uq.jobs.importing.format import UNITS, NotReadError, WrittenUnit
+from cmm_uq.jobs.importing.lengths.evidence import (
+    ColumnDifference,
+    differences,
+    families,
+    follows,
+    scatters,
+    steady,
+    without_derived,
+)
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said, said_by
 
-_BASES = ("reference", "nominal", "target")
+BASES = ("reference", "nominal", "target")
 _FAR = 1.0  # mm by which no measured length differs from its reference, where both are called so
+WIDEST = 100  # columns of a table of lengths
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
 _NAME = "Name the columns by what they are: nominal_mm, reference_mm, length_mm, deviation_um"
@@ -30,11 +39,9 @@ def lengths_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
         if {*"XYZ"} <= {grid.text(row, i) for row in rows} and hint(heading(path), lengths=True) != "line":
             return None  # coordinates of a report, one a row
     columns = columns_in(grid, blocks, rows)
-    for one in columns:
-        if one.role in _BASES and np.isfinite(one.values[0]) and not one.full:
-            filled, starts = one.downwards, [*np.flatnonzero(np.isfinite(one.values)), len(rows)]
-            evenly = len({*np.diff(starts).tolist()}) == 1  # each in the first of as many rows
-            one.values = filled if evenly and len(np.unique(filled)) < len(filled) else one.values
+    if len(columns) > WIDEST:
+        return None
+    _fill_down(columns)
     groups: list[list[FigureColumn]] = []
     for one in filter(_sized, columns):
         fars = [_FAR if one.role and group[0].role else 0.04 for group in groups]
@@ -43,17 +50,31 @@ def lengths_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
             fitting[0].append(one)
         else:
             groups.append([one])
-    groups = [own for own in groups if len(own) > 1 or own[0].role in (*_BASES, "measured") or own[0].is_length]
+    groups = [own for own in groups if len(own) > 1 or own[0].role in (*BASES, "measured") or own[0].is_length]
     _refuse_far(grid, rows, groups)
     readings = [found for own in groups if (found := _lengths(grid, rows, columns, own)) is not None]
     return max(readings, key=lambda found: (found.checked, len(found.figures)), default=None)
 
 
+def _fill_down(columns: Sequence[FigureColumn]) -> None:
+    """References that stand once for the rows below: evenly, or where what was measured stays near them."""
+    for one in columns:
+        if one.full or not np.isfinite(one.values[0]) or one.role in ("measured", "deviation") or one.minute:
+            continue
+        filled, starts = one.downwards, [*np.flatnonzero(np.isfinite(one.values)), len(one.values)]
+        evenly = one.role in BASES and len({*np.diff(starts).tolist()}) == 1 and len(np.unique(filled)) < len(filled)
+        near = (
+            o for o in columns if o.full and o is not one and o.role != "summary" and not o.counts and o.may_be_length
+        )
+        if evenly or any(np.nanmin(filled) > 0 and like(filled, o.values) for o in near):
+            one.values = filled
+
+
 def _sized(column: FigureColumn) -> bool:
     """Whether a column may hold lengths: not the count of something, nothing small, in a unit of lengths."""
-    if column.role in ("summary", "deviation") or not column.may_be_length or column.minute:
+    if column.role == "deviation" or not column.may_be_length or column.minute:
         return False
-    whole = column.role in _BASES or (column.role is None and column.is_length and not column.counts)
+    whole = column.role in BASES or (column.role is None and not column.counts)
     positive = np.nanmin(column.values) > 0 or column.role == "target"
     return bool((column.step < 1 or whole) and positive and np.nanmedian(np.abs(column.values)) >= 0.5)
 
@@ -61,7 +82,7 @@ def _sized(column: FigureColumn) -> bool:
 def _refuse_far(grid: CutSheet, rows: Sequence[int], groups: Sequence[Sequence[FigureColumn]]) -> None:
     """Measured lengths that are near no reference are an error, not another table."""
     bases = [c for own in groups for c in own if c.role in ("reference", "nominal")]
-    lone = [c for own in groups for c in own if c.role == "measured" and all(o.role not in _BASES for o in own)]
+    lone = [c for own in groups for c in own if c.role == "measured" and all(o.role not in BASES for o in own)]
     for k, row in enumerate(rows if bases and lone else ()):
         base, length = bases[0].values[k], lone[0].values[k]
         if not np.isfinite(base):
@@ -71,35 +92,53 @@ def _refuse_far(grid: CutSheet, rows: Sequence[int], groups: Sequence[Sequence[F
             raise NotReadError(what, where=grid.at(row, lone[0].i), fix=_NAME)
 
 
+def settled_base(group: Sequence[FigureColumn], pairs: Sequence[ColumnDifference]) -> FigureColumn | None:
+    """The column from which others differ by deviations beside them: it comes again, else by words, else by their sign."""
+    of: dict[int, set[int]] = {c.i: set() for c in group}
+    for pair in pairs:
+        a, b = pair.measured, pair.base
+        if scatters(b, a) or (not scatters(a, b) and _rank(a) < _rank(b)):
+            a, b = b, a
+        of[b.i].add(a.i)
+    most = max(map(len, of.values()), default=0)
+    return min((c for c in group if len(of[c.i]) == most > 0), key=lambda c: (_rank(c), c.step), default=None)
+
+
+def _rank(column: FigureColumn) -> int:
+    """How little words call a column a reference."""
+    return 3 if column.role == "measured" else (*BASES, None).index(column.role) if column.role in BASES else 2
+
+
 def _base(
     group: Sequence[FigureColumn], small: Sequence[FigureColumn]
 ) -> tuple[FigureColumn | None, list[FigureColumn]] | None:
-    """The reference among columns of one length each, and the measured ones, by deviations, else by words."""
-    named = [c for c in group if c.role in _BASES]
+    """The reference among columns of one length each, and the measured ones; ``None`` where nobody says which is which."""
+    base = settled_base(group, differences(group, small))
+    group = [c for c in group if c.role != "summary" or c is base]  # figures know better than words which is none
+    named = [c for c in group if c.role in BASES]
     measured = [c for c in group if c.role == "measured"]
-    open_ = [c for c in group if c.role is None and not c.sums_up(measured)]
-    pairs = [(d, m, f) for d in small if np.any(d.values) for m in (*measured, *open_) for f in d.factors(m)]
-    scores = {c.i: sum(m is not c and d.agrees(m, c, f) for d, m, f in pairs) for c in (*named, *open_)}
-    by_figures = [c for c in (*named, *open_) if scores[c.i] == max(scores.values()) > 0]
-    by_words = [c for c in named if c.role == "reference"] or named
-    fine = [c for c in open_ if c.step < 1]
-    base = next((c for c in by_words if c in by_figures), None) or next(iter(by_figures), None)
-    if base is None and by_words:
-        if by_words[0].role != "reference" and measured and fine:
-            return None  # which of both is calibrated nobody says
-        base = by_words[0]
-    elif base is None and measured and open_:
-        base = fine[0] if len(fine) == 1 else open_[0] if not fine and len(open_) == 1 else None
-        if base is None or (fine and not (base.is_length or len(open_) > 1)):
+    open_ = without_derived([c for c in group if c.role is None])
+    again = [c for c in (*named, *open_) if any(scatters(o, c) for o in group)]
+    fine = [c for c in again if not c.round]
+    others = [c for c in open_ if c.step < 1]
+    base = base or next((c for c in named if c.role == "reference"), None)
+    if base is None and len(fine) == 1:
+        base = fine[0]
+    elif base is None and named and measured and others:
+        return None  # which of both is calibrated nobody says
+    base = base or next(iter((*named, *(again if not fine else ()))), None)
+    if base is None and measured and open_:
+        base = others[0] if len(others) == 1 else open_[0] if not others and len(open_) == 1 else None
+        if base is None or (others and not (base.is_length or len(open_) > 1)):
             return None
-    elif base is None and len(group) == len(open_) == 1 and any(c.deviates for c in small):
+    elif base is None and len(group) == len(open_) == 1 and any(c.deviates and not steady(group[0], c) for c in small):
         base = open_[0]
     elif base is None and open_ and len(group) > len(open_) + len(measured):
         return None
-    rest = [c for c in group if c not in named and c is not base]
+    rest = [c for c in group if c is not base and (c not in named or (base is not None and scatters(c, base)))]
     rest = [c for c in rest if c.role == "measured" or base is None or c.step < min(1, 20 * base.step)]
-    rest = [c for c in rest if c.role == "measured"] or rest
-    return base, [c for c in rest if not c.sums_up([o for o in rest if o is not c and o.role == c.role])] or rest
+    rest = [c for c in rest if c.role == "measured"] or [c for c in rest if base is None or not follows(c, base)]
+    return base, without_derived(rest) or rest
 
 
 def _lengths(
@@ -107,7 +146,9 @@ def _lengths(
 ) -> SheetReading | None:
     most = np.nanmax(np.abs(group[0].values))
     small = [c for c in columns if c not in group and c.role != "summary" and c.may_be_length]
-    small = [c for c in small if c.deviates or (not c.counts and np.nanmax(np.abs(c.values)) < max(0.01 * most, 0.2))]
+    least = max(0.01 * most, 0.2)
+    little = [c for c in small if not c.counts and (np.nanmax(np.abs(c.values)) < least or np.nanmin(c.values) < 0)]
+    small = [c for c in small if c.deviates or c in little]
     if (found := _base(group, small)) is None:
         return None
     base, source = found
@@ -118,15 +159,17 @@ def _lengths(
         checked, factor = _checked(grid, rows, small, source, base)
     if not deviations:
         checked += sum(c.sums_up(source, worst=True) for c in columns if c.role == "summary")
-        base = base or _reference_in_head(grid, rows, source)
+        of_all = [steady(source[0], c) for c in small] if base is None and len(source) == 1 else []
+        base = base or _reference_in_head(grid, rows, source) or next(filter(None, of_all), None)
     named = {c.unit.name for c in source if c.unit} if deviations else set()
-    if not source or len(named) > 1 or not _side_by_side(source) or not _plain(columns, group, base, source, checked):
+    source = source if side_by_side(source) else counted_heads(source)
+    if not source or len(named) > 1 or not _plain(columns, group, base, source, checked):
         return None
     units = [c.unit for c in (*(() if deviations else source), *([base] if base else [])) if c.unit and not c.minute]
-    if not units and abs(factor - 1e-3) < 1e-12 and any(c.unit is not None and c.unit.name == "um" for c in small):
-        units = [UNITS["mm"]]  # by which measured minus reference is the deviation in µm
-    left = [c for c in group if c not in source and c is not base and c.role not in (*_BASES, "summary")]
-    if any(c.step < 1 and c.full and not c.sums_up(source, worst=True) for c in left):
+    units = units or [u for c in small if c.unit and (u := _unit_by(c.unit, factor)) is not None]
+    left = [c for c in group if c not in source and c is not base and c.role not in (*BASES, "summary")]
+    left = [c for c in without_derived([*source, *left]) if c in left and not (base and follows(c, base))]
+    if any(c.step < 1 and c.full for c in left):
         return None  # measured as well, for all that is known
     reading = SheetReading("lengths", units[0] if units else grid.unit_beside(rows), None, checked, deviations)
     reading.small = UNITS[named.pop()] if named else None
@@ -163,31 +206,49 @@ def _plain(
 ) -> bool:  # fmt: skip
     """Whether words or arithmetic leave no doubt of what the columns are."""
     if base is None:  # of one length alone, on many lines
-        others = any(c.role in _BASES and not c.counts for c in columns)
+        others = any(c.role in BASES and not c.counts for c in columns)
         return not others and all(c.is_length or c.role == "measured" for c in source)
     every = all(c.named for c in source) or (len(group) == 2 and base.role is not None)
     return bool(checked) or (base.named and every)
 
 
-def _side_by_side(columns: Sequence[FigureColumn]) -> bool:
+def side_by_side(columns: Sequence[FigureColumn]) -> bool:
     """Whether columns are runs or lines side by side: their heads are alike but for numbers, or all name a line or a run."""
     for texts in zip(*(c.path for c in columns), strict=True):
-        counted = len({re.sub(r"\d+", "0", text) for text in texts}) == 1
+        counted = len({*map(numberless, texts)}) == 1
         if not counted and any(hint(text, lengths=True) not in ("line", "run") for text in texts):
             return False
     return True
+
+
+def counted_heads(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
+    """Those of columns whose heads count them, as ``Run 1`` and ``Run 2``; none of the others, which nobody explains."""
+    several = [c for own in families(columns) if len(own) > 1 for c in own]
+    return several if side_by_side(several) else []
 
 
 def _deviations(
     grid: CutSheet, rows: Sequence[int], others: Sequence[FigureColumn], small: Sequence[FigureColumn], base: FigureColumn
 ) -> list[FigureColumn]:  # fmt: skip
     """Columns of deviations, beside which no measured length stands."""
-    source, runs = [c for c in small if c.deviates], [c for c in others if c.role == "measured"]
+    free = [c for c in small if not follows(c, base)]
+    parted = [c for c in free if c.step < 1 or np.nanmin(c.values) < 0]  # which no count of something is
+    source = [c for c in free if c.deviates] or [c for c in parted if c.role == "measured"]
+    runs = [c for c in others if c.role == "measured"]
     if not source and base.role and not all(c.counts for c in runs):
         what = f"{', '.join(repr(c.heading) for c in runs[:3])} may be lengths, or deviations in µm or mm"
         fix = said_by("deviation_um", runs, ", deviation_mm or length_mm")
         raise NotReadError(what, where=grid.at(rows[0]), fix=fix)
-    return without_sums(source) or source
+    source = source or (counted_heads(parted) if base.role else [])
+    source = without_derived(source) or source
+    once = len(np.unique(base.values)) == len(base.values)
+    return [] if once and len(source) == 1 and len(free) < len(small) and base.round else source  # as certificates are
+
+
+def _unit_by(small: WrittenUnit, factor: float) -> WrittenUnit | None:
+    """The unit of lengths in which measured minus reference is ``factor`` times the deviation in its unit."""
+    every = (UNITS[name] for name in ("mm", "inch"))
+    return next((unit for unit in every if abs(small.metres / unit.metres / (factor or 1e9) - 1) < 1e-6), None)
 
 
 def _checked(

@@ -1,0 +1,119 @@
+"""What figures say of columns side by side, whatever their heads are called.
+
+A deviation is measured minus reference to the printed digits; a reference comes again where what was measured scatters; means,
+ranges and extremes follow from others, and limits from the reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations
+
+import numpy as np
+
+from cmm_uq.jobs.importing.factors import numberless, way_of
+from cmm_uq.jobs.importing.roles import FigureColumn
+
+_LEAST = 4  # rows by which a column is known to follow from another
+
+
+@dataclass(frozen=True)
+class ColumnDifference:
+    """``deviation`` times ``factor`` is ``measured`` minus ``base`` to the printed digits, in all rows."""
+
+    deviation: FigureColumn
+    measured: FigureColumn
+    base: FigureColumn
+    factor: float
+
+
+def differences(group: Sequence[FigureColumn], small: Sequence[FigureColumn]) -> list[ColumnDifference]:
+    """Columns of ``group`` whose differences stand in ``small`` ones, and are more than their rounding."""
+    found = []
+    for d in small:
+        if not np.any(d.values) or not np.isfinite(d.values).any():
+            continue
+        at = int(np.nanargmax(np.abs(d.values)))  # the row in which the fewest pairs fit by chance
+        for m, b in permutations((c for c in group if c is not d), 2):
+            apart = m.values[at] - b.values[at]
+            for f in d.factors(m):
+                own, slack = d.values[at] * f, d.slack(m, b, f)
+                if abs(apart - own) <= slack < abs(own) and d.agrees(m, b, f):
+                    found.append(ColumnDifference(d, m, b, f))
+    return found
+
+
+def scatters(measured: FigureColumn, base: FigureColumn) -> bool:
+    """Whether one column comes again in many rows, and the other does not."""
+    both = np.isfinite(measured.values) & np.isfinite(base.values)
+    again, other = (len(np.unique(one.values[both])) for one in (base, measured))
+    return bool(again * 2 <= both.sum() and other >= again + max(2, (both.sum() - again) // 4))
+
+
+def steady(measured: FigureColumn, deviation: FigureColumn) -> FigureColumn | None:
+    """The one reference of all rows, less which what was measured is the deviation beside it; ``None`` where it differs."""
+    for f in deviation.factors(measured):
+        own, slack = measured.values - deviation.values * f, deviation.slack(measured, measured, f)
+        if len(own) >= _LEAST and np.ptp(own) <= 2 * slack and np.ptp(deviation.values * f) > 4 * slack:
+            digits = round(-np.log10(measured.step))
+            return replace(
+                measured, i=-1, values=np.full(len(own), round(float(np.median(own)), digits)), role="reference"
+            )
+    return None
+
+
+def follows(column: FigureColumn, base: FigureColumn) -> bool:
+    """Whether figures say nothing beside the reference: the same wherever it is the same, or a straight line of it."""
+    both = np.isfinite(column.values) & np.isfinite(base.values)
+    own, (of, which) = column.values[both], np.unique(base.values[both], return_inverse=True)
+    if 4 * len(of) <= 3 * len(own):
+        first = np.full(len(of), np.nan)
+        first[which] = own
+        return bool(np.abs(own - first[which]).max() <= 1e-9)
+    if len(own) < _LEAST or own.min() < 0 or len(of) < 3:
+        return False
+    line = np.polyval(np.polyfit(base.values[both], own, 1), base.values[both])
+    return bool(np.abs(own - line).max() <= 0.55 * column.step)
+
+
+def families(columns: Sequence[FigureColumn]) -> list[list[FigureColumn]]:
+    """Columns whose heads are alike but for their number, together."""
+    alike: dict[str, list[FigureColumn]] = {}
+    for c in columns:
+        alike.setdefault(numberless(c.heading), []).append(c)
+    return [*alike.values()]
+
+
+def without_derived(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
+    """Columns that are no mean, range, deviation or extreme of others, nor the mean or difference of two such."""
+    left, out = [*columns], list[FigureColumn]()
+    for c in columns:
+        others = [o for o in left if o is not c]
+        if any(c.sums_up(own, worst=True) for own in sets_of(others, c)):
+            left.remove(c)
+            out.append(c)
+    for c in [*left]:
+        step = 0.55 * c.step
+        for a, b in combinations((o.values for o in out), 2):
+            sums = ((a + b) / 2, a - b, b - a, np.abs(a - b))
+            if c in left and any(np.all(np.abs(c.values - one) <= step + max(o.step for o in out)) for one in sums):
+                left.remove(c)
+    return left
+
+
+def sums_of(columns: Sequence[FigureColumn], others: Sequence[FigureColumn]) -> bool:
+    """Whether each column is a mean, range or extreme of the same of others, row by row."""
+    alike = len(columns) < len(others) and all(len(c.values) == len(others[0].values) for c in columns)
+    return alike and all(any(c.sums_up(own, worst=True) for own in sets_of(others, c)) for c in columns)
+
+
+def sets_of(columns: Sequence[FigureColumn], beside: FigureColumn) -> Iterator[Sequence[FigureColumn]]:
+    """Columns that a mean may be of: all, those of one head, those of one sense of travel, those of one family."""
+    yield columns
+    for part in {c.path[0] for c in columns if len(c.path) > 1 and c.path[0]}:
+        yield [c for c in columns if c.path[0] == part]
+    yield from ([c for c in columns if way_of(c.heading) == sense] for sense in (1, -1))
+    yield from families(columns)
+    before = [c for c in columns if c.i < beside.i]
+    yield before

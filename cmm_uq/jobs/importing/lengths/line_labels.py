@@ -1,0 +1,113 @@
+"""Which labels name lines and which count runs of lengths: by words, else by what tells all of them apart."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from cmm_uq.base.points import Ints
+from cmm_uq.jobs.importing.factors import (
+    LINE,
+    POINT,
+    RUN,
+    Counted,
+    Label,
+    counted,
+    counting,
+    fixes,
+    hint,
+    in_turn,
+    numbered_runs,
+    together,
+    varying,
+)
+from cmm_uq.jobs.importing.format import NotReadError
+
+
+def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
+    """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
+    count, several, found = len(reference), bool(reference.max(initial=0) > 0), varying(labels, lengths=True)
+    if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
+        found = [(f[0], f[1], RUN if f[0].sort == "head" and counting(f[0].values) else f[2]) for f in found]
+    plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
+    run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
+    line: list[Counted] = []
+    called = [f for f in plain if f[2] == LINE]
+    for one in sorted(called, key=lambda f: (several and fixes(f[1], reference), f[0].sort == "part", -f[1].max())):
+        if not line or not fixes(together(*(f[1] for f in line)), one[1]):
+            line.append(one)
+    lined = any(f[2] == LINE for f in found)
+    line, run = _told_apart(reference, [f for f in plain if f[2] in (None, POINT)], line, run, place, lined=lined)
+    # else one length on each line, which are named and not counted
+    line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
+    key = together(reference, *(f[1] for f in line))
+    each = key if run is None else together(key, run[1])
+    if each.max() + 1 < count if run is not None else len({*Counter(key.tolist()).values()}) > 1:
+        what = "lengths of one line and one run have the same nominal length"
+        fix = 'Say what tells them apart: columns = { line = "…", repeat = "…" }'
+        raise NotReadError(what, where=place, fix=fix)
+    names = [" ".join(dict.fromkeys(parts)) for parts in zip(*(f[0].values for f in line), strict=True)]
+    titles = [one for one in labels if one.sort == "title" and counted(one, lengths=True) == LINE]
+    titled = [one.values[0] for one in labels if one.values[0] and (one.sort == "sheet" or one in titles)]
+    numbers = in_turn(key) if run is None else numbered_runs(run[0].values)
+    used = [f[0].words for f in (*line, *([run] if run else []))]
+    return names or [titled[-1] if titled else "1"] * count, numbers, used
+
+
+def _told_apart(
+    reference: Ints, others: Sequence[Counted], line: list[Counted], run: Counted | None, place: str, *, lined: bool
+) -> tuple[list[Counted], Counted | None]:
+    """Labels of lines and runs, with those that no word explains and that are needed to tell lengths apart."""
+    count, rank = len(reference), {s: k for k, s in enumerate(("title", "sheet", "head", "block", "part", "column"))}
+
+    def apart(*more: Ints) -> int:
+        """How many of the lengths are told apart."""
+        return int(together(reference, *(f[1] for f in line), *([run[1]] if run else []), *more).max()) + 1
+
+    def order(f: Counted) -> tuple[bool, bool, int, int]:
+        return f[2] == POINT, run is not None and fixes(f[1], run[1]), rank[f[0].sort], int(f[1].max())
+
+    columns = [f for f in others if f[0].sort == "column"]
+    others = [
+        f for f in others if f not in columns or not any(_says(g, f) for g in (*columns, *([run] if run else [])))
+    ]
+    named = [f for f in others if f[0].sort in ("column", "part") and not _digits(f[0])]
+    if run is None and not line:  # what counts is a run, where a name beside it tells all others apart
+        counts = [f for f in others if f[0].sort in ("column", "part") and _digits(f[0])]
+        runs = [f for f in counts if any(apart(a[1], f[1]) == count > apart(a[1]) for a in others if not _digits(a[0]))]
+        run = runs[0] if len({f[1].tobytes() for f in runs}) == 1 else None
+    for one in sorted(others, key=order):
+        if apart() == count or apart(one[1]) == apart():
+            continue
+        whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
+        if run is None and (named or lined) and _digits(one[0]):
+            run = one
+        elif line or whole or not (one[0].sort == "column" or (one[0].sort == "part" and _digits(one[0]))):
+            line.append(one)
+        else:
+            fix = f'Say by which column: columns = {{ line = "{one[0].words}" }}'
+            raise NotReadError("nothing says which lengths lie on one line", where=place, fix=fix)
+    return line, run
+
+
+def _one_run(labels: Sequence[Label], runs: Sequence[Counted], place: str) -> Counted | None:
+    """The label that counts runs; an error where two do, each in its own way."""
+    if unnamed := [label.words for label in labels if label.sort == "unnamed"]:
+        raise NotReadError("no line is named", where=unnamed[0], fix="Complete the row")
+    run = min(runs, key=lambda f: f[1].max(), default=None)
+    heads = next((len({*f[0].values}) for f in runs if f[0].sort == "head"), 0)
+    numbering = [one for one in labels if one.sort == "column" and counting(one.values)]
+    columns = [one.words for one in numbering if hint(one.words, lengths=True) == RUN]
+    if (heads and columns) or (run is not None and any(not fixes(run[1], f[1]) for f in runs)):
+        what = f"{(columns or [runs[0][0].words])[0]!r} counts runs, and so do {heads or 'other'} columns"
+        raise NotReadError(what, where=place, fix="Name one of them alone: columns")
+    return run
+
+
+def _says(one: Counted, other: Counted) -> bool:
+    """Whether one label says the other, and more."""
+    return one is not other and one[1].max() > other[1].max() and fixes(one[1], other[1])
+
+
+def _digits(label: Label) -> bool:
+    return all(value.strip().isdigit() for value in label.values)

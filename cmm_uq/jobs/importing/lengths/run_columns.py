@@ -1,0 +1,83 @@
+"""Deviations at targets along an axis, there and back: down a table, a way and a run in each column or in each row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.blocks import Block, CutSheet
+from cmm_uq.jobs.importing.factors import codes, senses, way_of, ways_of
+from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, without_derived
+from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, settled_base
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like
+
+_OFF_MM = 1.0  # farther from its target no axis comes to rest
+
+
+def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
+    """Deviations at targets of rows below one head: ``None`` where there are none, or no sense of travel is named."""
+    columns = [c for c in columns_in(grid, blocks, rows) if c.may_be_length]
+    target = _target(columns) if len(columns) <= WIDEST else None
+    if target is None or not np.isfinite(target.values[0]):
+        return None
+    values = target.downwards
+    filled = replace(target, values=values)
+    beside = [c for c in columns if c is not target and c.role in (None, "deviation", "measured")]
+    ways = _ways(beside)
+    small = [c for c in beside if (c.step < 1 or ways[c.i]) and not like(c.values + 1000, values + 1000)]
+    small = [c for c in without_derived(small) if ways[c.i] or not follows(c, filled)]
+    directed = [c for c in small if ways[c.i]] or [c for c in small if c.role == "deviation"]
+    source = directed or small  # the others are reversals, spreads and what was recorded beside them
+    source = sorted((c for own in families(source) if len(own) > 1 for c in own), key=lambda c: c.i) or source
+    reading = SheetReading("runs", unit=target.unit, small=next((c.unit for c in source if c.unit), None))
+    reached = _reached(columns, target, values)
+    given = differences([filled, *reached], small)
+    if given:
+        source = [c for c in small if any(c is one.deviation for one in given)]
+        reading.checked = len(source)
+    elif reached and not any(ways[c.i] for c in source):
+        source, reading.positions = [replace(c, values=c.values - values) for c in reached], True
+    if not source or len({c.heading for c in source}) < len(source):
+        return None  # or of two instruments
+    reading.taken = {"target": [target], "reading_um": source}
+    reading.collect(grid, rows, columns, [c.i for c in reached])
+    for k, row in enumerate(rows):
+        for c in source:
+            if np.isfinite(c.values[k]):
+                reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
+            else:
+                reading.blank.append((row, c.i))
+    return reading if senses(reading.every_label, codes([one[0] for one in reading.figures])) is not None else None
+
+
+def _ways(columns: Sequence[FigureColumn]) -> dict[int, int]:
+    """Sense of travel that the head of each column names, or one level of all heads; 0 where none does."""
+    ways = {c.i: way_of(c.heading) for c in columns}
+    for level in zip(*(c.path for c in columns), strict=True) if len({len(c.path) for c in columns}) == 1 else ():
+        ways |= dict(zip(ways, ways_of(level) or (), strict=False))
+    return ways
+
+
+def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
+    """The column of targets: called so, or from which others differ by what stands beside them, or the only large one."""
+    large = [c for c in columns if np.ptp(c.values[np.isfinite(c.values)]) > 1 and not c.minute]
+    called = [c for c in large if c.role in ("target", "nominal")]
+    if called:
+        return min(called, key=lambda c: c.counts)  # and not their numbers
+    large = [c for c in large if c.role in (None, "measured", "reference") and not c.counts]
+    near = [c for c in large if any(o is not c and like(c.values + 1000, o.values + 1000) for o in large)]
+    small = [c for c in columns if c not in near and c.role != "summary"]
+    if near and (base := settled_base(near, differences(near, small))) is not None:
+        return base
+    far = [c for c in large if c.role is None and np.ptp(c.values[np.isfinite(c.values)]) > 10 * _OFF_MM]
+    return far[0] if len(far) == 1 else None
+
+
+def _reached(columns: Sequence[FigureColumn], target: FigureColumn, values: Floats) -> list[FigureColumn]:
+    """Positions that were reached."""
+    near = [c for c in columns if c is not target and c.role in (None, "measured", "reference")]
+    near = [c for c in near if c.step < 1 and like(c.values, values, _OFF_MM)]
+    return without_derived(near) if np.nanmax(np.abs(values)) > 10 * _OFF_MM else []

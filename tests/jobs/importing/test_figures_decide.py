@@ -1,0 +1,127 @@
+"""What figures say is understood whatever columns are called, in whatever order, with whatever stands beside them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, imported
+
+REFERENCE = (30.0004, 120.0007, 240.0001, 390.0012, 570.0009)
+LINES, RUNS = 3, 3
+MOTHER = [
+    [[((37 * i + 11 * k + 23 * r + 5 * i * k) % 29 - 14) / 10 for r in range(RUNS)] for k in range(5)]
+    for i in range(LINES)
+]
+"""Deviations in µm of each line, length and run."""
+
+
+def read(rows: list[list[str]], decimal: str) -> set[tuple[str, float, int, float]]:
+    """Line, reference, run and measured length of each length of a table."""
+    content = "\n".join(";".join(row).replace(".", decimal) for row in rows) + "\n"
+    with pytest.raises(UnplacedError) as asked:
+        imported(content.encode(), "a.csv", ImportKeys())
+    return {
+        (line, round(float(of or 0), 4), run, round(value, 4))
+        for one in asked.value.lengths
+        for line, of, run, value in zip(one.names, one.reference, one.repeat, one.measured, strict=True)
+    }
+
+
+EXPECTED = {
+    (f"Ova {i + 1}", REFERENCE[k], r + 1, round(REFERENCE[k] + MOTHER[i][k][r] / 1000, 4))
+    for i in range(LINES)
+    for k in range(5)
+    for r in range(RUNS)
+}
+
+
+def columns_of(words: tuple[str, str, str, str]) -> dict[str, list[str]]:
+    """Columns by what they are, each with its head, in a language that nobody speaks."""
+    name, of, measured, deviation = words
+    every = [(i, k) for i in range(LINES) for k in range(5)]
+    columns = {
+        "line": [name, *(f"Ova {i + 1}" for i, _ in every)],
+        "reference": [f"{of} [mm]", *(f"{REFERENCE[k]:.4f}" for _, k in every)],
+    }
+    for r in range(RUNS):
+        columns[f"measured {r}"] = [
+            f"{measured} {r + 1} [mm]",
+            *(f"{REFERENCE[k] + MOTHER[i][k][r] / 1000:.4f}" for i, k in every),
+        ]
+        columns[f"deviation {r}"] = [f"{deviation} {r + 1} [µm]", *(f"{MOTHER[i][k][r]:.1f}" for i, k in every)]
+    columns["nominal"] = ["Ukto", *(f"{round(REFERENCE[k], -1):.0f}" for _, k in every)]
+    columns["mean"] = ["Zelb [µm]", *(f"{np.mean(MOTHER[i][k]):.2f}" for i, k in every)]
+    columns["range"] = ["Zirg [µm]", *(f"{np.ptp(MOTHER[i][k]):.1f}" for i, k in every)]
+    columns["limit"] = ["Volk [µm]", *(f"{1.7 + REFERENCE[k] / 300:.1f}" for _, k in every)]
+    columns["verdict"] = ["Jur", *("da" for _ in every)]
+    return columns
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.permutations(["reference", *(f"{of} {r}" for r in range(RUNS) for of in ("measured", "deviation"))]),
+    st.sets(st.sampled_from(["nominal", "mean", "range", "limit", "verdict"])),
+    st.sampled_from(".,"),
+    st.sampled_from(
+        [
+            ("Hule", "Brane", "Tonk", "Fisp"),
+            ("Line", "Calibrated", "Measured", "Error"),
+            ("測線", "校正値", "実測値", "誤差"),
+        ]
+    ),
+)
+def test_lengths_are_the_same_in_any_order_language_and_company(
+    order: list[str], beside: set[str], decimal: str, words: tuple[str, str, str, str]
+) -> None:
+    columns = columns_of(words)
+    chosen = ["line", *order, *(name for name in columns if name in beside)]
+    assert read([list(row) for row in zip(*(columns[name] for name in chosen), strict=True)], decimal) == EXPECTED
+
+
+def test_of_deviations_that_are_nobodys_difference_nothing_is_read() -> None:
+    """A mutant: one figure of the measured lengths is changed, and no pair of columns fits their deviation any more."""
+    columns = columns_of(("Hule", "Brane", "Tonk", "Fisp"))
+    columns["measured 0"][4] = "390.0512"
+    rows = [
+        ";".join(row)
+        for row in zip(*(columns[n] for n in ("line", "reference", "measured 0", "deviation 0")), strict=True)
+    ]
+    with pytest.raises(CmmUqError) as asked:
+        imported("\n".join(rows).encode(), "a.csv", ImportKeys())
+    assert not isinstance(asked.value, UnplacedError)
+
+
+TARGETS = (-200, -120, -40, 40, 120, 200)
+
+
+def runs(rows: list[list[str]]) -> ImportedTable:
+    content = "\n".join(";".join(row) for row in rows) + "\n"
+    return imported(content.encode(), "a.csv", ImportKeys.model_validate({"lines": {"X": "along X from 0,0,0"}}))
+
+
+def test_runs_there_and_back_are_the_same_down_and_across() -> None:
+    """Means, reversals and spreads beside or below them are no runs, whatever they are called."""
+    there = [[((7 * k + 5 * r) % 11) / 10 for k in range(6)] for r in range(3)]
+    back = [[((5 * k + 3 * r) % 13) / 10 - 3 for k in range(6)] for r in range(3)]
+    summed = [np.mean(there, 0), np.mean(back, 0), np.mean(there, 0) - np.mean(back, 0)]
+    across = [["Unt X-axis", ""], ["Pisk (mm)", *(f"{t}" for t in TARGETS)], ["", *("" for _ in TARGETS)]]
+    for r in range(3):
+        across += [
+            [f"Kle {r + 1} ↑ (µm)", *(f"{v:.1f}" for v in there[r])],
+            [f"Kle {r + 1} ↓ (µm)", *(f"{v:.1f}" for v in back[r])],
+        ]
+    across += [[f"Zum{n} (µm)", *(f"{v:.2f}" for v in own)] for n, own in zip("abc", summed, strict=True)]
+    down = [across[0], *(list(row) for row in zip(*(row for row in across[1:] if row[0]), strict=True))]
+    found, turned = runs(down), runs(across)
+    for table in (found, turned):
+        assert len(table.lines) == 36
+        assert table.columns["reading_um"][table.columns["approach_x"] > 0].tolist() == pytest.approx(
+            np.ravel(there).tolist()
+        )
+    assert {name: values.tolist() for name, values in found.columns.items()} == {
+        n: v.tolist() for n, v in turned.columns.items()
+    }
