@@ -22,7 +22,12 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
-from cmm_uq.analysis.diagnosis.comparison.combinations import CombinationPrior, Combinations, Key
+from cmm_uq.analysis.diagnosis.comparison.combinations import (
+    CombinationPrior,
+    Combinations,
+    Key,
+    effects_of_every_machine,
+)
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, Explanation, Member, effect_of
@@ -60,19 +65,22 @@ class AlternativeSet:
 def alternative_sets(
     comparison: CandidateComparison, combinations: Combinations, chosen: Key, versions: Sequence[Version]
 ) -> tuple[AlternativeSet, ...]:
-    """Of each effect of one coefficient, and of each two, the smallest sets that the readings do not tell from them."""
+    """Of each effect, and of each two of one coefficient, the smallest sets that the readings do not tell from them."""
     every, sets, found = comparison.explanations, list[tuple[Key, Key]](), list[AlternativeSet]()
     prior = CombinationPrior(every, combinations.counts, comparison.visible)
     names = [str.__str__(one.name) for one in every]
     single = [i for i in sorted(chosen) if _single(every[i])]
-    for taken in (*((i,) for i in single), *subsets(single, 2)):
-        for members, sizes, lost, part in _instead(comparison, chosen, versions, taken):
+    rigid = frozenset(effects_of_every_machine(comparison))
+    alone = [i for i in sorted(chosen) if every[i].kind == EFFECT and not every[i].members[0].shape]
+    for taken in (*((i,) for i in alone), *subsets(single, 2)):
+        always = frozenset() if rigid >= set(taken) else rigid
+        for members, sizes, lost, part in _instead(comparison, chosen, versions, taken, always):
             own = frozenset(taken), frozenset(members)
             if any(one[0] <= own[0] and one[1] <= own[1] for one in sets):
                 continue
             odds, after = float(np.exp(lost)), (chosen - own[0]) | own[1]
             beforehand = float(np.exp(np.clip(prior.log(chosen) - prior.log(after), -700, 700)))
-            if part <= _ALIKE or odds * beforehand <= ODDS:
+            if part <= _ALIKE or odds * beforehand <= ODDS or own[1] <= always:
                 sets.append(own)
                 named, titles = tuple(names[i] for i in members), tuple(effect_of(every[i]).title for i in members)
                 found.append(AlternativeSet(tuple(names[i] for i in taken), named, titles, sizes, odds, beforehand))
@@ -80,9 +88,12 @@ def alternative_sets(
 
 
 def _instead(
-    comparison: CandidateComparison, chosen: Key, versions: Sequence[Version], taken: tuple[int, ...]
+    comparison: CandidateComparison, chosen: Key, versions: Sequence[Version], taken: tuple[int, ...], always: Key
 ) -> list[tuple[tuple[int, ...], tuple[float, ...], float, float]]:
-    """Smallest sets in the place of some effects, their sizes, what they lose of the log likelihood and of what is shown."""
+    """Smallest sets in the place of some effects, their sizes, what they lose of the log likelihood and of what is shown.
+
+    That those ``always`` there are more, or differ in size, is no evidence against them.
+    """
     others = [i for i in sorted(comparison.visible) if i not in chosen and _single(comparison.explanations[i])]
     given = [v for v in versions if v.explanation in chosen and v.explanation not in taken]
     forms, lengths = _forms(comparison, given, np.array([*others, *taken], dtype=np.intp))
@@ -94,13 +105,15 @@ def _instead(
         return []
     square = float(comparison.left @ comparison.left) - size**2
     variance = max(square / max(comparison.degrees_of_freedom - len(taken) - len(given), 1), comparison.least_noise**2)
-    candidates = _like(forms[:, seen], lengths[seen], shown / size, size, variance, _MOST if len(taken) == 1 else 1)
+    largest, spare = _MOST if len(taken) == 1 else 1, own.shape[1] if own.shape[1] > len(taken) else 0
+    candidates = _like(forms[:, seen], lengths[seen], shown / size, size, variance, largest, spare)
     tried = sorted(candidates, key=lambda one: one[0])[:_TRIED]
     names = [tuple(others[seen[k]] for k in each) for _, each, _ in tried]
     evidence = _evidence(comparison, given, [taken, *names])
     found: list[tuple[tuple[int, ...], tuple[float, ...], float, float]] = []
     for (lost, _, sizes), members, log in zip(tried, names, evidence[1:], strict=True):
-        if evidence[0] - log <= np.log(ODDS):
+        lost = max(lost - 0.5 * max(spare - len(members), 0), 0.0)
+        if evidence[0] - log <= np.log(ODDS) or always >= set(members):
             found.append((members, tuple(sizes.tolist()), lost, 2 * lost * variance / size**2))
     return [one for one in found if not any(set(less[0]) < set(one[0]) for less in found)]
 
@@ -125,11 +138,12 @@ def _forms(comparison: CandidateComparison, given: Sequence[Version], numbers: I
 
 
 def _like(
-    forms: Floats, lengths: Floats, target: Floats, size: float, variance: float, largest: int
+    forms: Floats, lengths: Floats, target: Floats, size: float, variance: float, largest: int, coefficients: int
 ) -> Iterator[tuple[float, tuple[int, ...], Floats]]:
     """Sets, what they lose of the log likelihood, and how large each member is then, in prior standard deviations."""
-    cosine, gram, most = forms.T @ target, forms.T @ forms, 2 * np.log(ODDS) * variance / size**2
+    cosine, gram = forms.T @ target, forms.T @ forms
     for count in range(1, largest + 1):
+        most = (2 * np.log(ODDS) + max(coefficients - count, 0)) * variance / size**2
         every = np.array(list(subsets(range(len(cosine)), count)), dtype=np.intp).reshape(-1, count)
         blocks = gram[every[:, :, None], every[:, None, :]]
         sound = np.linalg.det(blocks) > _DISTINCT
@@ -197,13 +211,16 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
     listed, sets, combinations = [], tuple[AlternativeSet, ...](), result.combinations
     if combinations is not None and result.chosen:
         sets = alternative_sets(result.first.comparison, combinations, result.chosen, result.versions)
+    rigid = {str(result.first.explanations[i].name) for i in effects_of_every_machine(result.first.comparison)}
     for effect in (e for e in result.model.effects if e.name in result.effects):
         modes = period_modes(result, index[effect.name])
         known = not modes or jointly.period_settled(result, index[effect.name], modes)
         probability, together, group = _probability(result, index[effect.name], known=known)
         stand_ins = tuple(one for one in sets if effect.name in one.instead_of)
         # that it is one effect and not two is no evidence: by the readings alone
-        fewer = [1 / one.odds for one in stand_ins if len(one.effects) != len(one.instead_of)]
+        fewer = [
+            1 / one.odds for one in stand_ins if len(one.effects) != len(one.instead_of) or {*one.effects} <= rigid
+        ]
         by_readings = min(probability, together / (1 + sum(fewer))) if fewer else probability
         group = group if probability < NAMED or by_readings == probability else ()
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]

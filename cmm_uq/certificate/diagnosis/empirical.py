@@ -28,10 +28,10 @@ from cmm_uq.maths.uncertainty.quantity import alike, rounded, significant
 EMPIRICAL = "empirical.toml"  # file that states the functions as effects of a job's own
 
 FORMS: Mapping[str, Text] = {
-    "smooth": say("a smooth curve"), "step": say("a step"), "ramp": say("a ramp"), "dent": say("a dent"), "bow": say("a bow"),
-    "cubic": say("a cubic"), "saturating": say("one that levels off"), "exponential": say("an exponential"),
-    "sine": say("a sine"), "sawtooth": say("a sawtooth"), "dead_zone": say("a dead zone"), "product": say("a product"),
-    "bowl": say("a bowl"),
+    "smooth": say("a smooth curve"), "rough": say("a rough curve"), "step": say("a step"), "ramp": say("a ramp"),
+    "dent": say("a dent"), "bow": say("a bow"), "cubic": say("a cubic"), "saturating": say("one that levels off"),
+    "exponential": say("an exponential"), "sine": say("a sine"), "sawtooth": say("a sawtooth"),
+    "dead_zone": say("a dead zone"), "product": say("a product"), "bowl": say("a bowl"),
 }  # fmt: skip
 _MANY = 1e4  # odds from which only this is told
 _PARAMETERS: Mapping[str, Text] = {

@@ -65,6 +65,18 @@ def test_play_that_grows_across_is_told_as_a_function_of_the_sense_of_motion_and
     assert "function of direction of travel along X and Y" in str(one.why)
 
 
+@pytest.mark.parametrize(("shorter", "named"), [(0.0, True), (4.0, False)])
+def test_waves_that_grow_shorter_are_no_period(shorter: float, *, named: bool) -> None:
+    random = np.random.default_rng(5)
+    once = bars(random, 200, 400.0, Machine("m", "XYZ", TRAVEL))
+    u = (once.xyz[:, 1] - once.xyz[:, 1].min()) / float(np.ptp(once.xyz[:, 1]))
+    error = 6e-3 * np.sin(2 * np.pi * (3 * u + shorter * u**2))
+    noise = 1.5e-3 * random.standard_normal(once.xyz.shape)
+    found = search(model(once.at(once.xyz - error[:, None] * [0, 1, 0] + noise)), 1.5e-3, alpha=0.01, seed=0)
+    assert "periodic_scale_y" in found.effects
+    assert ("periodic_scale_y" in {one.effect for one in doubted(found)[0].values()}) is not named
+
+
 @pytest.mark.long
 def test_what_is_withheld_so_is_modelled_as_a_function() -> None:
     found = diagnose(model(recording(growing=True)), stated_um=1.5, alpha=0.01, seed=0)

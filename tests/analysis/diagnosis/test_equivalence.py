@@ -87,6 +87,19 @@ def test_a_strong_squareness_stands_alone() -> None:
     assert not sets_of(found)
 
 
+def test_squarenesses_that_a_job_does_not_name_are_one_class_with_what_they_look_like() -> None:
+    """Seven lines of a gauge, each with a length of its own: another temperature on each, or three squarenesses."""
+    facts = artefact_facts(kind="step_gauge", u_um=0.5)
+    truth = ("squareness_xy", "squareness_yz", "squareness_zx")
+    read = indicated(facts, step_gauge(), truth, (3.0, 6.0, 5.0), sigma=2e-3, seed=4)
+    found = search(model(facts, read, (), None), None, alpha=0.01, seed=1)
+    assert found.effects == ("artefact_set_up_temperature",)
+    one = sets_of(found)["squareness_yz", "squareness_zx"]
+    assert one.odds < 20
+    told = search(model(facts, read, truth, None), None, alpha=0.01, seed=1)
+    assert told.first.p_value > 0.01
+
+
 @pytest.mark.long
 def test_what_imitates_a_weak_effect_by_chance_is_not_told() -> None:
     """Of all pairs whose least squares lose less than 20 : 1 and yet leave a hundredth of it; no identity is among them."""

@@ -18,7 +18,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, reading_name
 from cmm_uq.jobs.columns import in_words
 
-SMOOTH = "smooth"  # of no form in particular
+SMOOTH, ROUGH = "smooth", "rough"  # of no form in particular, with a slope everywhere and without
 PRODUCT, BOWL = "product", "bowl"  # forms of two readings
 _STEPS, _HINGES, _PLACES, _SATURATES, _PHASES = 40, 19, 24, 15, 12
 _WIDTHS, _SOFT, _REACHES, _DEAD = (0.03, 0.06, 0.12), (0.04, 0.08, 0.16), (0.05, 0.1, 0.2, 0.4), 6
@@ -130,6 +130,11 @@ def _grid(*nodes: Floats) -> tuple[Floats, Floats]:
     )  # type: ignore[return-value]
 
 
+_ROUGH, _GRID, _KEPT = (
+    (0.4, 0.15, 0.05),
+    100,
+    3e-3,
+)  # lengths, in parts of the range; nodes; part of what shows that is kept
 _TURNED = 0.3  # how readily a curve of rotation is thought of, beside a displacement
 _SEEN = 1e-9  # mm, length of columns for a size that physics allows
 _PARTS = np.array([-0.5, -0.375, -0.25, -0.125, 0.0, 0.125, 0.25, 0.375, 0.5])  # of the distance of two nodes
@@ -199,13 +204,24 @@ def _families(
     term: FunctionTerm, seen: Seen, covariate: Floats, *, forms: bool = True, weight: float = 1.0
 ) -> Iterator[FunctionFamily]:
     """Of one covariate (p,); ``seen`` gives the columns (m, q) of functions (p, q)."""
-    log = float(np.log(weight)) - (float(np.log(2)) if forms else 0.0)
-    smooth = list(smooth_functions(covariate))
-    for f in smooth:
-        yield FunctionFamily(term, SMOOTH, seen(f)[:, None], log - float(np.log(len(smooth))), covariate, f[:, None])
+    log = float(np.log(weight)) - (float(np.log(3)) if forms else 0.0)
+    curves = {SMOOTH: list(smooth_functions(covariate)), ROUGH: list(_rough_functions(covariate)) if forms else []}
+    for form, of_form in curves.items():
+        for f in of_form:
+            yield FunctionFamily(term, form, seen(f)[:, None], log - float(np.log(len(of_form))), covariate, f[:, None])
     every = list(forms_of(covariate, time=term.of == "time_s")) if forms else []
-    for form in every:
-        yield _of_form(term, form, seen, covariate, log - float(np.log(len(every) * len(form.shapes))))
+    for closed in every:
+        yield _of_form(term, closed, seen, covariate, log - float(np.log(len(every) * len(closed.shapes))))
+
+
+def _rough_functions(covariate: Floats) -> Iterator[Floats]:
+    """Factors (p, r), mm, of exponential covariances (Karhunen–Loève on a grid, Nyström beyond): wear, slip, uneven waves."""
+    place, grid = (covariate - covariate.min()) / float(np.ptp(covariate)), np.linspace(0, 1, _GRID)
+    for length in _ROUGH:
+        eigenvalues, vectors = np.linalg.eigh(np.exp(-np.abs(grid[:, None] - grid) / length))
+        keep = eigenvalues > _KEPT * eigenvalues[-1]
+        cross = np.exp(-np.abs(place[:, None] - grid) / length)
+        yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
 
 
 def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
@@ -223,8 +239,10 @@ def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
 
         return seen
 
-    time = points.columns.get("time_s")
-    timed = time is not None and len(np.unique(time)) > 2
+    varied = {
+        key: np.asarray(column) for key, column in points.columns.items()
+        if (key == "time_s" or key.startswith("temp_")) and len(np.unique(column)) > 2
+    }  # fmt: skip
     for along in AXES:
         for axis, read in readings.items():
             yield from _families(_curve(along, axis), moving(along), read)
@@ -239,12 +257,13 @@ def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
                 formula = f"{p}*{q}" if name == PRODUCT else f"{p}**2;{q}**2"
                 nowhere = np.zeros((0, 1, f.shape[1]))
                 yield FunctionFamily(of, name, columns, -float(np.log(2)), np.zeros(0), nowhere, formula=formula)
-        if timed and along in readings:
-            half = 0.5 * float(np.ptp(readings[along]))
-            title = say("scale of {axis} as a function of time", axis=_letter(along))
-            since = f"(time_s + {points.start!r})" if points.start else "time_s"
-            term = FunctionTerm("time_s", title, along, along, f"*{along}/{half!r}", since)
-            yield from _families(term, moving(along, readings[along] / half), np.asarray(time))
+        for key, column in varied.items() if along in readings else ():
+            half, timed = 0.5 * float(np.ptp(readings[along])), key == "time_s"
+            of_time = say("scale of {axis} as a function of time", axis=_letter(along))
+            other = say("scale of {axis} as a function of {name}", axis=_letter(along), name=in_words(key))
+            since = f"(time_s + {points.start!r})" if timed and points.start else key
+            term = FunctionTerm(key, of_time if timed else other, along, along, f"*{along}/{half!r}", since)
+            yield from _families(term, moving(along, readings[along] / half), column)
 
 
 def _of_approach(result: SearchResult) -> Iterator[FunctionFamily]:

@@ -20,7 +20,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, U
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical import evidence
-from cmm_uq.analysis.diagnosis.empirical.functions import SMOOTH, FunctionTerm, families_of
+from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, FunctionTerm, families_of
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
@@ -120,7 +120,7 @@ def _described(data: evidence.FunctionFit, result: SearchResult) -> EmpiricalFun
     own = [i for i in chosen if data.families[i].form == name]
     x, y, u = _function(data, chosen)
     form, stated = None, ""
-    if name != SMOOTH and (most >= ODDS / (1 + ODDS) or not len(x)):
+    if name not in (SMOOTH, ROUGH) and (most >= ODDS / (1 + ODDS) or not len(x)):
         form, stated = _named(data, own, name, most)
         form = form if most >= ODDS / (1 + ODDS) else None
     elif len(x) and term.along is not None:
