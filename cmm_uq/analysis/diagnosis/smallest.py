@@ -117,8 +117,7 @@ def phases(view: Visibility, lefts: Floats) -> tuple[Floats, Floats, Floats]:
         gram[:, a, b] = gram[:, b, a] = own[a] if a == b else 0.5 * (squares[k] - own[a] - own[b])
     strengths, turn = np.linalg.eigh(gram)
     strengths = np.maximum(strengths, 0.0)
-    way = turn.sum(axis=2) / sqrt(r)
-    return np.sqrt(strengths[:, 0]), np.sqrt(strengths.mean(axis=1)), way
+    return np.sqrt(strengths[:, 0]), np.sqrt(strengths.mean(axis=1)), turn.sum(axis=2) / sqrt(r)
 
 
 def aliased(view: Visibility, lefts: Floats, values: Floats) -> NDArray[np.bool_]:

@@ -230,8 +230,7 @@ def factor_regions(
 
     named, placed = columns_of(model.effects, _of_place), columns_of(field.effects, lambda one: not one.columns)
     acting = _chosen(model.effects, named), _chosen(field.effects, placed)
-    moved = partial(_moved, model.artefact.points.machine, *acting)
-    whole, *eighths = (moved(ends) for ends in (((0.0, 1.0),) * 3, *EIGHTHS))
+    whole, *eighths = (_moved(model.artefact.points.machine, *acting, ends) for ends in (((0.0, 1.0),) * 3, *EIGHTHS))
     same = np.logical_and.reduce([np.all(np.isfinite(one), axis=1) for one in (whole, *eighths)])
     named = named[same]
     keys = [model.unknowns[i].key for i in named]

@@ -260,8 +260,7 @@ class AtPose:
         found = [[self.read(each, exact=exactly) for exactly in (False, True)] for each in drawn]
         first, exact = (np.concatenate(each) for each in zip(*found, strict=True))
         apart = first - exact
-        spread = np.maximum(exact.std(axis=0), ROUNDING)
-        return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
+        return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / np.maximum(exact.std(axis=0), ROUNDING))
 
 
 def in_parts(plan: Plan, draws: int) -> list[int]:

@@ -107,8 +107,7 @@ def prove_job(
     of_artefact = {name for name, effect in every().items() if effect.mechanism == _OF_ARTEFACT}
     judged = tuple(judge(case, records[case.number], named, of_artefact.__contains__) for case in cases)
     ordered = tuple(records[case.number] for case in cases)
-    proof = DiagnosisProof(job, design, options.seed, options.alpha, truth, ordered, ProofJudgement(judged))
-    return proof, answers
+    return DiagnosisProof(job, design, options.seed, options.alpha, truth, ordered, ProofJudgement(judged)), answers
 
 
 def _records(

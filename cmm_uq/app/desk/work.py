@@ -69,8 +69,7 @@ def report(job: str, tell: Tell) -> dict[str, Any]:
         of_part = write_part(folder, options=PartOptions(), stage=stage)
         return {"id": of_part.name, "sha256": "", "field": None}
     written = write_report(folder, stage=stage, records=None)
-    digest = sha256(written.results).hexdigest()
-    return {"id": written.name, "sha256": digest, "field": vectors(written)}
+    return {"id": written.name, "sha256": sha256(written.results).hexdigest(), "field": vectors(written)}
 
 
 def vectors(written: Written[Outcome]) -> dict[str, Any] | None:

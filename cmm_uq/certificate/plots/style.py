@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -329,11 +329,16 @@ _MM = 25.4 / 72  # of a point
 
 
 def width_mm(text: str, size: float, weight: str = "normal") -> float:
+    return _width_mm(str.__str__(text), size, weight, *measuring_fonts())
+
+
+@lru_cache(maxsize=4096)
+def _width_mm(text: str, size: float, weight: str, *families: str) -> float:
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
-    font = FontProperties(family=measuring_fonts(), weight=weight)
-    return _MM * max(farthest_right(TextPath((0, 0), str.__str__(text), size=size, prop=font)), size)
+    font = FontProperties(family=[*families], weight=weight)
+    return _MM * max(farthest_right(TextPath((0, 0), text, size=size, prop=font)), size)
 
 
 def farthest_right(path: Outline) -> float:

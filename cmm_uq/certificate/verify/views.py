@@ -50,9 +50,10 @@ def differing_parts(stands: bytes, should: bytes, *, signed: bool = False) -> li
 
     ``signed``: what signatures add to a PDF is no difference.
     """
+    if stands == should:
+        return []
     with reading("the PDF"):
-        a = dict(_parts(stands))  # read in any case: what cannot be read is refused
-        b = a if stands == should else dict(_parts(should))
+        a, b = dict(_parts(stands)), dict(_parts(should))
     added = {path for path in a if path not in b and _OF_SIGNATURES.match(path)} if signed else set()
     paths = (path for path in {**a, **b} if a.get(path) != b.get(path) and path not in added)
     found = []

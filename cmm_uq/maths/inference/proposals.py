@@ -60,8 +60,7 @@ class Proposal:
     def numbers_of(self, count: int, random: Any) -> Numbers:
         """What draws are made of, taken in a fixed order: normal numbers (count, d), χ² (count, 1), distribution (count,)."""
         normal = random.standard_normal((count, len(self.centre)))
-        squares = random.chisquare(_DOF, size=(count, 1))
-        return normal, squares, chosen(self._cumulative, count, random)
+        return normal, random.chisquare(_DOF, size=(count, 1)), chosen(self._cumulative, count, random)
 
     def made(self, numbers: Numbers) -> Floats:
         """Coordinates (w, d) from such numbers, also of several draws one after another."""

@@ -46,8 +46,7 @@ class MemberGroup:
     @cached_property
     def first(self) -> Ints:
         """Where each explanation's members begin; they follow one another."""
-        others = self.explanation[1:] != self.explanation[:-1]
-        return np.flatnonzero(np.concatenate([[True], others]))
+        return np.flatnonzero(np.concatenate([[True], self.explanation[1:] != self.explanation[:-1]]))
 
     def part(self, among: Container[int] | None) -> slice:
         """Members from the first to the last of some explanations; all by default."""
