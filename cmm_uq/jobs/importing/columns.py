@@ -133,6 +133,7 @@ class ExportTable:
         if not set(map(len, body)) - {width}:
             self.cells = list(zip(*body, strict=True))
         self.called = named_alike(sheet.rows, self.rows)  # rows ahead of results
+        self.kinds = all(map(is_summary, body))  # then a word for summaries is one for something else, as S for spheres
         if (
             not self.cells
             or self.called < len(body)
@@ -159,7 +160,7 @@ class ExportTable:
             row = sheet.rows[i]
             if not any(cell != "" for cell in row):
                 continue
-            if is_summary(row) or i >= self.header.first + self.called:
+            if (is_summary(row) and not self.kinds) or i >= self.header.first + self.called:
                 self.left_out.append(shown(sheet, i, SUMMARY))
             elif all(place >= len(row) or row[place] == "" for place in needed) or (
                 any(place >= len(row) or row[place] == "" for place in needed) and not any(map(_figured, row))

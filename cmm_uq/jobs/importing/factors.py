@@ -173,7 +173,8 @@ def codes(values: Sequence[object]) -> Ints:
 
 def fixes(a: Ints, b: Ints) -> bool:
     """Whether the one says the other."""
-    return len({*zip(a.tolist(), b.tolist(), strict=True)}) == len({*a.tolist()})
+    pairs = np.unique(a * (int(b.max(initial=0)) + 1) + b)
+    return len(pairs) == len(np.unique(a))
 
 
 def together(*every: Ints) -> Ints:
@@ -184,6 +185,7 @@ def varying(labels: Sequence[Label], *, lengths: bool) -> list[Counted]:
     """Labels, and parts of names, that differ and are there for all, without those that say the same again."""
     seen: dict[bytes, Counted] = {}
     names = (label for label in labels if label.sort in ("column", "head", "title") and len({*label.values}) > 1)
+    names = (label for label in names if not all(map(str.isdecimal, label.values)))
     for label in (*labels, *(part for name in names for part in parts_of(name))):
         own = codes(label.values)
         if own.max(initial=0) and "" not in label.values:

@@ -33,7 +33,9 @@ _RIGID_MM = 0.1
 _EVEN_MM = 0.2  # to which the points of a plate are evenly spaced
 _COMPARED = 5000  # points of which the places are compared
 _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
-_TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED = 6.0, 5.0, 4.0, 3.0, 2.0  # what speaks for a way, the strongest first
+# what speaks for a way, the strongest first
+_TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED, _AT_LEAST = 6.0, 5.0, 4.0, 3.0, 2.0, 1.0
+_FEW = 3  # points, which may be anything
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,11 @@ class Grouping:
     measurement: Ints
     at: Ints  # a number for each place of each measurement
     point: Counted | None  # label of points; ``None`` where they count in turn
+
+    @property
+    def parts(self) -> bool:
+        """Whether parts of names tell measurements apart."""
+        return self.of is not None and self.of[0].sort == "part"
 
 
 def places(xyz: Floats) -> Ints:
@@ -69,9 +76,12 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     named = any(way.of is None and way.rank and way.at.max() + 1 < len(xyz) for way in ways)  # names that come again
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
-    ways = [
-        way for way in ways if way.rank and not (plate and way.of and way.of[0].sort == "part" and way.rank < _WORDS)
-    ]
+    if not found and place.max() + 1 == len(xyz) > _FEW and not any(way.rank for way in ways):
+        return {
+            "measurement": ["1"] * len(xyz),
+            "point": [f"{k + 1}" for k in range(len(xyz))],
+        }  # a list, and nothing else
+    ways = [way for way in ways if way.rank >= _NAMED and not (plate and way.parts and way.rank < _WORDS)]
     best = max(ways, key=lambda way: (way.rank, -way.measurement.max()), default=None)
     others = (way for way in ways if best and way.rank == best.rank and not _same(way.measurement, best.measurement))
     if best is None or (best.rank <= _NAMED and any(others)):
@@ -100,8 +110,8 @@ def _in_turn(xyz: Floats) -> Iterator[Counted]:
 
 def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Floats) -> Grouping | None:
     """Places told apart by a label of measurements; ``None`` where two of them would be one."""
-    if of is None:
-        measurements = [np.zeros_like(place)]
+    if of is None or place.max() + 1 == len(place):
+        measurements = [np.zeros_like(place) if of is None else of[1]]
     else:  # words for placements hold, even where a plate has the same places in each, as in its own coordinates
         placed = counted(of[0], lengths=True) == LINE == of[2] and of[0].sort != "part"
         measurements = [*([] if placed else [_of_places(of[1], place)]), of[1]]
@@ -141,7 +151,9 @@ def _rank(of: Counted, shape: str, *, named: bool, again: Counted | None) -> flo
         return _TURNED + word
     if word > 0 and (shape or named):
         return _WORDS
-    if of[0].sort == "turn" or of[2] == POINT:
+    if of[0].sort == "turn":
+        return _AT_LEAST if shape else 0.0
+    if of[2] == POINT:
         return 0.0
     if shape == "moved":
         return (_NAMED if of[0].sort == "part" else _RESTARTED if of[0].sort == "column" else _MOVED) + word

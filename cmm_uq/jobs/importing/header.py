@@ -273,7 +273,7 @@ def with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping
 def names_axes(row: Sequence[Cell]) -> bool:
     """Whether a row is a head of coordinates, and no row of a table."""
     texts = [cell for cell in row if isinstance(cell, str) and cell]
-    if len(texts) < 3 or len(texts) < sum(cell != "" for cell in row) or any(map(is_number, texts)):
+    if len(texts) < 3 or len(texts) < sum(cell != "" for cell in row) or any(one[0] in _FIGURES for one in texts[-3:]):
         return False
     letters = [{*plain_words(text)} & {*AXES} for text in texts]
     return {*COORDINATES} <= {understood(text).column for text in texts} or all({axis} in letters for axis in AXES)

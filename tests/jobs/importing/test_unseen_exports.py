@@ -14,6 +14,10 @@ read them, but for what ``ASKED`` and ``REFUSED`` say; places of lines are asked
 Ninety more were written for development in November 2026, fifty-six of them tables of lengths and runs, of which 25 came out
 as their authors have it at the first try and 3 were read wrongly; fourteen that each show another assumption to be wrong
 stand in ``length_exports``.
+
+Thirty of these ninety are lists of points: 11 of them were read as their authors have them, 4 wrongly. Twelve of those stand here (``point_exports``): pages that go on, results below
+points, holes across with a row for each axis, sheets of placements, turned plates, lists without a head, figures behind
+letters.
 """
 
 from __future__ import annotations
@@ -43,13 +47,14 @@ FOLDERS = [
         "later_exports",
         "last_exports",
         "length_exports",
+        "point_exports",
     )
 ]
 EXPECTED = {
     path.name.removesuffix(".expected.json"): path for folder in FOLDERS for path in sorted(folder.glob("*.json"))
 }
 NO_AXIS = "V30"  # runs whose file leaves open which axis was measured
-ASKED = {"10": "unit", "15": "unit"}
+ASKED = {"10": "unit", "15": "unit", "C06": "unit", "C13": "unit", "C26": "unit"}
 """By number: what is asked beside where lines lie, of files that name no unit."""
 REFUSED = {
     "S07": "is no measured length",

@@ -1,0 +1,115 @@
+"""What figures say of points holds whatever columns are called and wherever they stand: words only break ties."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.recording import ImportedTable, imported
+
+WORDS = ("Bade", "Fiku", "Lomi", "Nuvo", "Sare", "Tupo", "Wegi", "Zalu")  # of no language
+BAR = np.array([0.0, 120.0, 210.0, 360.0, 500.0])  # places of the balls of a beam, unevenly spaced
+PLACED = {"Q1": (60, 400, -300, 1, 0, 0), "Q2": (300, 80, -310, 0, 1, 0), "Q3": (90, 120, -420, 0.48, 0.6, 0.64)}
+
+
+def observations() -> list[tuple[str, int, int, np.ndarray, np.ndarray]]:
+    """Placement, ball, run, nominal and measured place of each ball of a beam in three placements, twice each."""
+    random = np.random.default_rng(5)
+    found = []
+    for placement, (*start, a, b, c) in PLACED.items():
+        for run in (1, 2):
+            for ball, along in enumerate(BAR, 1):
+                nominal = np.round(np.array(start) + along * np.array([a, b, c]), 1)
+                found.append((placement, ball, run, nominal, np.round(nominal + random.normal(0, 0.002, 3), 4)))
+    return found
+
+
+SEEN = observations()
+EXPECTED = sorted((int(one[0][1:]), one[1], one[2], *one[4]) for one in SEEN)
+
+
+def columns(words: Sequence[str], *, deviations: bool, more: bool) -> list[list[str]]:
+    """Columns of a table, each below its head."""
+    text: list[list[str]] = [
+        [words[0], *(one[0] for one in SEEN)],
+        [words[1], *(f"K{one[1]}" for one in SEEN)],
+        [words[2], *(f"{one[2]}" for one in SEEN)],
+    ]
+    for k, axis in enumerate("XYZ"):
+        text.append([f"{axis} {words[3]}", *(f"{one[4][k]:.4f}" for one in SEEN)])
+        text.append([f"{axis} {words[4]}", *(f"{one[3][k]:.4f}" for one in SEEN)])
+        if deviations:
+            text.append([f"{axis} {words[5]}", *(f"{one[4][k] - one[3][k]:.4f}" for one in SEEN)])
+    if more:
+        text += [[words[6], *(f"{12.5 + 0.0001 * (k % 3):.4f}" for k in range(len(SEEN)))]]
+        text += [
+            [f"{words[7]} {axis}", *(f"{n:.3f}" for _ in SEEN)] for axis, n in zip("XYZ", (0.6, 0.0, 0.8), strict=True)
+        ]
+    return text
+
+
+def read(table: Sequence[Sequence[str]], sign: str = ".") -> ImportedTable:
+    text = "\n".join(";".join(row).replace(".", sign) for row in zip(*table, strict=True))
+    return imported(f"Wegi: mm\n\n{text}\n".encode(), "a.csv", ImportKeys(unit="mm"))
+
+
+def rows(found: ImportedTable) -> list[tuple[float, ...]]:
+    names = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")
+    return sorted(zip(*(found.columns[name].tolist() for name in names), strict=True))
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.permutations(WORDS), st.randoms(use_true_random=False), st.sampled_from(".,"), st.booleans(), st.booleans(),
+)  # fmt: skip
+def test_points_are_the_same_below_any_words_in_any_order(
+    words: Sequence[str], order: object, sign: str, deviations: bool, more: bool
+) -> None:
+    table = columns(words, deviations=deviations, more=more)
+    order.shuffle(table)  # type: ignore[attr-defined]
+    assert rows(read(table, sign)) == EXPECTED
+
+
+def test_a_row_for_each_axis_is_the_same() -> None:
+    """A feature a block, with its diameter; names of three parts, and no word that is known."""
+    lines = ["Wegi: mm"]
+    for placement, ball, run, nominal, measured in SEEN:
+        lines += [f"Fiku  {placement}_{ball}_{run}", "      Lomi        Nuvo        Sare       +Tupo      -Tupo"]
+        lines += [
+            f"  {axis}  {n:12.4f}{m:12.4f}{m - n:12.4f}     0.0500    -0.0500"
+            for axis, n, m in zip("XYZ", nominal, measured, strict=True)
+        ]
+        lines += ["  D       25.0000     25.0011      0.0011     0.0500    -0.0500", ""]
+    found = imported("\n".join(lines).encode(), "a.txt", ImportKeys(unit="mm"))
+    assert rows(found) == EXPECTED
+
+
+def test_nominal_values_alone_are_not_taken_for_measured_ones() -> None:
+    table = [own for own in columns(WORDS, deviations=True, more=False) if WORDS[3] not in own[0]]
+    with pytest.raises(CmmUqError, match="may be nominal values"):
+        read(table)
+
+
+def test_two_lists_that_are_measured_alike_are_asked_about() -> None:
+    table = [own for own in columns(WORDS, deviations=False, more=False) if WORDS[4] not in own[0]]
+    table += [[f"{axis} {WORDS[5]}", *(f"{one[4][k] + 0.001:.4f}" for one in SEEN)] for k, axis in enumerate("XYZ")]
+    with pytest.raises(CmmUqError, match="may both be measured places"):
+        read(table)
+
+
+def test_rows_of_a_plate_are_no_measurements_of_a_beam() -> None:
+    names = [f"{letter}{k}" for letter in "ABCDE" for k in range(1, 6)]
+    places = [(83 * k, 83 * m, 5) for m in range(5) for k in range(5)]
+    random = np.random.default_rng(6)
+    rows_ = (
+        ";".join([name, *(f"{v + random.normal(0, 0.002):.4f}" for v in at)])
+        for name, at in zip(names, places, strict=True)
+    )
+    found = imported(("Name;X;Y;Z\n" + "\n".join(rows_)).encode(), "a.csv", ImportKeys(unit="mm"))
+    assert set(found.columns["measurement"]) == {1}
+    assert len(set(found.columns["point"])) == 25
