@@ -15,9 +15,9 @@ Ninety more were written for development in November 2026, fifty-six of them tab
 as their authors have it at the first try and 3 were read wrongly; fourteen that each show another assumption to be wrong
 stand in ``length_exports``.
 
-Thirty of these ninety are lists of points: 11 of them were read as their authors have them, 4 wrongly. Twelve of those stand here (``point_exports``): pages that go on, results below
-points, holes across with a row for each axis, sheets of placements, turned plates, lists without a head, figures behind
-letters.
+Thirty of these ninety are lists of points: 11 of them were read as their authors have them, 4 wrongly. Twelve of those stand
+in ``point_exports``: pages that go on, results below points, holes across with a row for each axis, sheets of placements,
+turned plates, lists without a head, figures behind letters.
 """
 
 from __future__ import annotations
