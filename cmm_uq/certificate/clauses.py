@@ -171,7 +171,8 @@ def _with_u(value: Text, of: Unit, u_um: float) -> Text:
 
 def _fitted(size: Size, quantity: Quantity) -> tuple[Text, Text]:
     value, U, k = expanded(quantity)
-    shown = say("{value} {unit}, U = {U} {unit}", value=value, unit=size.unit, U=U)
+    U, of = (significant(quantity.expanded / MICROMETRE), unit("µm")) if size.unit == "mm" else (U, size.unit)
+    shown = say("{value} {unit}, U = {U} {of}", value=value, unit=size.unit, U=U, of=of)
     shown = shown if k == NO_FACTOR else say("{figure} (k = {k})", figure=shown, k=k)
     return say("{size} after the fit", size=size.title), shown
 

@@ -22,7 +22,7 @@ from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.jobs.tables.conformity import LINE_KEYS, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact, Forms, Indications
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine
-from cmm_uq.maths.uncertainty.quantity import nominal
+from cmm_uq.maths.uncertainty.quantity import nominal, significant
 
 _OPPOSITE = -0.9  # Cosine of the angle between two tips from which on they look away from each other
 _RIGHT_ANGLE = 0.1  # Of a bar's direction, the part along a tip below which it is square to it
@@ -157,15 +157,15 @@ def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> tupl
 
 def _in_words(items: Sequence[Decided], worst: Decided, stated: TestUncertainty) -> tuple[Text, Text]:
     """Where u comes from, and how many lengths are decided with it."""
-    uncertain, u = NOT_STATED, worst.u_um
+    uncertain, u, shown = NOT_STATED, worst.u_um, significant(worst.u_um)
     beside = uncertainty.LENGTH_LINES[1:]
     if u > 0 and any(getattr(stated, LINE_KEYS[line]) or stated.declared(line) for line in beside):
-        uncertain = say("u is the test uncertainty (ISO/TS 23165), {u_um:.3g} µm for the length named.", u_um=u)
+        uncertain = say("u is the test uncertainty (ISO/TS 23165), {u_um} µm for the length named.", u_um=shown)
     elif u > 0:
         uncertain = say(
-            "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um:.3g} µm for "
+            "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um} µm for "
             "the length named; nothing else is stated.",
-            u_um=u,
+            u_um=shown,
         )
     least = say(
         "least favourable: measurement {measurement}, repeat {repeat}, {length} mm",
@@ -219,10 +219,9 @@ def _bar_budget(test: Test) -> tuple[Budget, Text]:
     budget = Budget(what, lines, unit=micrometre)
     if budget.u > 0:
         return budget, say(
-            "u is the test uncertainty: what of the bar changed between its positions, {u:.3g} µm. "
-            "What its certificate leaves uncertain is common to all and cancels; the machine's own scatter is part of what "
-            "is tested.",
-            u=budget.u,
+            "u is the test uncertainty: what of the bar changed between its positions, {u} µm. What its certificate leaves "
+            "uncertain is common to all and cancels; the machine's own scatter is part of what is tested.",
+            u=significant(budget.u),
         )
     if test.answered:
         return budget, NOT_STATED
@@ -231,10 +230,10 @@ def _bar_budget(test: Test) -> tuple[Budget, Text]:
         line = BudgetLine(twice, size.sd / MICROMETRE, CERTIFICATE, unit=micrometre, sensitivity=two)
         bound = Budget(what, [line], unit=micrometre)
         return bound, say(
-            "u is a bound of the test uncertainty, {u:.3g} µm: it is not stated what of the bar changed between its "
+            "u is a bound of the test uncertainty, {u} µm: it is not stated what of the bar changed between its "
             "positions, and it is taken to be no more than its certificate leaves uncertain. The machine's own scatter is "
             "part of what is tested.",
-            u=bound.u,
+            u=significant(bound.u),
         )
     return budget, say(
         "Nothing is stated of what the bar leaves uncertain: in its place u is the machine's own "

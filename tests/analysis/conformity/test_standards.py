@@ -420,7 +420,7 @@ def test_a_guarded_statement_on_lengths_remarks_their_uncertainty_and_the_worst(
     errors = {(1, 1, 20.0): 0.1, (1, 1, 612.3456): 2.5}
     found = judged(gauge([np.eye(3)[0]], [[20.0, 612.3456]], errors=errors, repeats=1, u_um=0.41236))
     assert found.remarks == (
-        "u is the test uncertainty (ISO/TS 23165), 0.412 µm for the length named.",
+        "u is the test uncertainty (ISO/TS 23165), 0.41 µm for the length named.",
         "2 lengths decided, each by its own u and limit; least favourable: measurement 1, repeat 1, 612.3456 mm.",
         BY_MEASUREMENT_ALONE,
         *DECLARED,
@@ -433,7 +433,7 @@ def test_a_guarded_statement_on_lengths_remarks_their_uncertainty_and_the_worst(
 def test_where_the_calibration_alone_is_stated_the_remark_says_that_nothing_else_is() -> None:
     found = judged(gauge([np.eye(3)[0]], [[400.0]], repeats=1, u_um=0.41236), under=Circumstances())
     assert found.remarks[0] == (
-        "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, 0.412 µm for the length "
+        "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, 0.41 µm for the length "
         "named; nothing else is stated."
     )
 
