@@ -135,7 +135,11 @@ def drawn(seed: int) -> Drawn:
     facts = result.job.facts
     model = facts.model.model_copy(update={"tolerances": tolerances})
     diagnosed = replace(result.diagnosed, diagnosis=replace(result.diagnosed.diagnosis, verdict="consistent"))
-    job = replace(result.job, facts=facts.model_copy(update={"model": model}))
+    chain = facts.artefact.certificate
+    assert chain is not None
+    elsewhere = chain.model_copy(update={"machine": "another"})  # its own machine's certificate makes no pass
+    artefact = facts.artefact.model_copy(update={"certificate": elsewhere})
+    job = replace(result.job, facts=facts.model_copy(update={"model": model, "artefact": artefact}))
     ls = result.least_squares
     column = [i for i, unknown in enumerate(ls.unknowns) if unknown.key[0] in free]
     estimate = replace(result.estimate, least_squares=replace(ls, null_space=np.eye(len(ls.unknowns))[:, column]))
