@@ -39,6 +39,8 @@ from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 _TAILS = [0.025, 0.5, 0.975]
+# lengths, each by every coefficient of the machine, that memory holds; and ordered pairs of points that are looked at for them
+_LENGTHS, _PAIRS = 20_000, 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,11 +110,12 @@ def _quantity(draws: Floats, of_mean: float, of_unit: str) -> Quantity:
 
 
 def rows_of(artefact: Artefact) -> Ints | None:
-    """(m, 2) points between which the lengths of an artefact lie; ``None`` of one that has none."""
+    """(m, 2) points between which the lengths of an artefact lie; ``None`` of one that has none, or far too many."""
     if artefact.lengths() is not None:
         return artefact.rows if artefact.rows.shape[1] == 2 else None
-    found = artefact.indications()
-    return None if found is None else found.rows
+    each = np.bincount(artefact.points.group)
+    found = artefact.indications() if each @ (each - 1) < _PAIRS else None
+    return None if found is None or len(found.rows) > _LENGTHS else found.rows
 
 
 ALL = "all"

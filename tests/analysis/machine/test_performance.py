@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from benchmarks.coverage.performance import ALONE, CORRECTED, FIGURES, LARGEST, Cell, measured
 from benchmarks.parts import curved, machines
 from cmm_uq.analysis.conformity.accuracy import figures
-from cmm_uq.analysis.machine.performance import performance_of
+from cmm_uq.analysis.machine.performance import performance_of, rows_of
 from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.app.commands.estimation import accuracy
 from cmm_uq.app.commands.reading import job_of
@@ -230,3 +230,16 @@ def test_a_report_of_bars_that_are_measured_thrice_has_it() -> None:
     assert set(FIGURES) <= set(data["accuracy_if_left_returns"])
     for name, one in data["accuracy_if_left_returns"].items():
         assert one["U"] < 0.9 * data["accuracy_uncertainty"][name]["U"]
+
+
+def test_distances_between_thousands_of_balls_have_no_figures_of_performance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They grow with the square of the balls, and what every error does to each of them is more than memory holds."""
+    plate = analysed("plate-simulated").artefact
+    rows = rows_of(plate)
+    assert rows is not None
+    monkeypatch.setattr("cmm_uq.analysis.machine.performance._LENGTHS", len(rows) - 1)
+    assert rows_of(plate) is None
+    monkeypatch.setattr("cmm_uq.analysis.machine.performance._LENGTHS", len(rows))
+    assert rows_of(plate) is not None
+    monkeypatch.setattr("cmm_uq.analysis.machine.performance._PAIRS", 2 * len(rows))
+    assert rows_of(plate) is None
