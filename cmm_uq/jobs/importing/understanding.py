@@ -38,6 +38,7 @@ from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, row
 
 _COMPARED = 5000  # points of sheets
 _SAME_MM, _OFF_MM = 1e-4, 0.1  # of places of one line, rounded
+_REPEATS = 20  # most of which a row below them is the mean
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+")
 Found = tuple[SheetReading, CutSheet]
@@ -206,7 +207,7 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         usable = [
             row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
         ]
-        own = _layout(grid, usable) if usable else []
+        own = _layout(grid, _without_sums(grid, usable)) if usable else []
         readings: list[SheetReading] = []
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
@@ -236,6 +237,31 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
     return found
 
 
+def _without_sums(grid: CutSheet, rows: list[int]) -> list[int]:
+    """Rows that are no mean of those above them, and have a word where those are numbered."""
+    kept, above = list[int](), list[int]()
+    for row in rows:
+        fine = [k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1]
+        named = any(
+            grid.figure(row, k) is None and grid.text(row, k) and all(grid.text(r, k).isdigit() for r in above)
+            for k in range(len(grid.figures[row]) if len(above) > 1 else 0)
+        )
+        if (
+            named
+            and fine
+            and all(
+                abs(np.mean(grid.column(above, k)[0]) - grid.column([row], k)[0][0])
+                <= 1.05 * grid.column([row], k)[1][0]
+                for k in fine
+            )
+        ):
+            above = []
+        else:
+            kept.append(row)
+            above = [*above, row][-_REPEATS:]
+    return kept
+
+
 def _layout(grid: CutSheet, rows: list[int]) -> list[int]:
     """Rows that have figures where most of them have."""
     fine = {k for row in rows for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1}
@@ -244,7 +270,8 @@ def _layout(grid: CutSheet, rows: list[int]) -> list[int]:
     most = many if len(many) >= 0.4 * len(rows) else [*signs.values()]  # and not the second line of each
     common = Counter(k for own in most for k in own)
     needed = {k for k, n in common.items() if n > 0.6 * len(most)}
-    return [row for row in rows if len(signs[row] & needed) * 2 >= len(needed)]
+    near = [row for row in rows if len(signs[row] & needed) * 2 >= len(needed)]
+    return [row for row in near if needed <= signs[row] or not grid.other_quantity(row)]
 
 
 @dataclass

@@ -11,9 +11,9 @@ read wrongly, of twenty-four (``later_exports``) 16 and 3, with two recordings o
 nineteen languages (``last_exports``, without one that is no whole workbook) 13 and none. All are read below as their authors
 read them, but for what ``ASKED`` and ``REFUSED`` say; places of lines are asked for.
 
-Ninety more were written for development in November 2026, fifty-six of them tables of lengths and runs, of which 25 came out
-as their authors have it at the first try and 3 were read wrongly; fourteen that each show another assumption to be wrong
-stand in ``length_exports``.
+Ninety more were written for development in November 2026, sixty of them tables of lengths and runs, of which 30 came out as
+their authors have it at the first try and 3 were read wrongly; fourteen that each show another assumption to be wrong stand
+in ``length_exports``.
 
 Thirty of these ninety are lists of points: 11 of them were read as their authors have them, 4 wrongly. Twelve of those stand
 in ``point_exports``: pages that go on, results below points, holes across with a row for each axis, sheets of placements,

@@ -27,6 +27,7 @@ from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, 
 
 BASES = ("reference", "nominal", "target")
 _FAR = 1.0  # mm by which no measured length differs from its reference, where both are called so
+_LEAST = 2.0  # of a length without a reference, in the unit of the file
 WIDEST = 100  # columns of a table of lengths
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
@@ -207,7 +208,8 @@ def _plain(
     """Whether words or arithmetic leave no doubt of what the columns are."""
     if base is None:  # of one length alone, on many lines
         others = any(c.role in BASES and not c.counts for c in columns)
-        return not others and all(c.is_length or c.role == "measured" for c in source)
+        near = bool(np.nanmedian(source[0].values) >= _LEAST) and all(like(source[0].values, c.values) for c in source)
+        return near and not others and all(c.is_length or c.role == "measured" for c in source)
     every = all(c.named for c in source) or (len(group) == 2 and base.role is not None)
     return bool(checked) or (base.named and every)
 
