@@ -27,7 +27,7 @@ from cmm_uq.jobs.importing.factors import codes, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import places
 from cmm_uq.jobs.importing.header import Header, is_summary
-from cmm_uq.jobs.importing.lengths.evidence import sums_of
+from cmm_uq.jobs.importing.lengths.evidence import sums_of, without_means
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lines_and_runs
 from cmm_uq.jobs.importing.lengths.run_columns import runs_in
@@ -38,7 +38,6 @@ from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, row
 
 _COMPARED = 5000  # points of sheets
 _SAME_MM, _OFF_MM = 1e-4, 0.1  # of places of one line, rounded
-_REPEATS = 20  # most of which a row below them is the mean
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+")
 Found = tuple[SheetReading, CutSheet]
@@ -207,7 +206,7 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         usable = [
             row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
         ]
-        own = _layout(grid, _without_sums(grid, usable)) if usable else []
+        own = _layout(grid, without_means(grid, usable)) if usable else []
         readings: list[SheetReading] = []
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
@@ -235,31 +234,6 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
     if problem is not None and not found:
         raise problem
     return found
-
-
-def _without_sums(grid: CutSheet, rows: list[int]) -> list[int]:
-    """Rows that are no mean of those above them, and have a word where those are numbered."""
-    kept, above = list[int](), list[int]()
-    for row in rows:
-        fine = [k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1]
-        named = any(
-            grid.figure(row, k) is None and grid.text(row, k) and all(grid.text(r, k).isdigit() for r in above)
-            for k in range(len(grid.figures[row]) if len(above) > 1 else 0)
-        )
-        if (
-            named
-            and fine
-            and all(
-                abs(np.mean(grid.column(above, k)[0]) - grid.column([row], k)[0][0])
-                <= 1.05 * grid.column([row], k)[1][0]
-                for k in fine
-            )
-        ):
-            above = []
-        else:
-            kept.append(row)
-            above = [*above, row][-_REPEATS:]
-    return kept
 
 
 def _layout(grid: CutSheet, rows: list[int]) -> list[int]:

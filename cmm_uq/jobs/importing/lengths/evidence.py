@@ -12,9 +12,11 @@ from itertools import combinations, permutations
 
 import numpy as np
 
+from cmm_uq.jobs.importing.blocks import CutSheet
 from cmm_uq.jobs.importing.factors import numberless, way_of
 from cmm_uq.jobs.importing.roles import FigureColumn
 
+_REPEATS = 20  # most of which a row below them is the mean
 _LEAST = 4  # rows by which a column is known to follow from another
 
 
@@ -117,3 +119,21 @@ def sets_of(columns: Sequence[FigureColumn], beside: FigureColumn) -> Iterator[S
     yield from families(columns)
     before = [c for c in columns if c.i < beside.i]
     yield before
+
+
+def without_means(grid: CutSheet, rows: Sequence[int]) -> list[int]:
+    """Rows that are no mean of those above them, with a word where those are numbered."""
+    kept, above = list[int](), list[int]()
+    for row in rows:
+        fine = [k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1]
+        named = any(
+            grid.figure(row, k) is None and grid.text(row, k) and all(grid.text(r, k).isdigit() for r in above)
+            for k in range(len(grid.figures[row]) if len(above) > 1 else 0)
+        )
+        own = [(grid.column(above, k)[0].mean(), *grid.column([row], k)) for k in fine if named]
+        if own and all(abs(mean - value[0]) <= 1.05 * step[0] for mean, value, step in own):
+            above = []
+        else:
+            kept.append(row)
+            above = [*above, row][-_REPEATS:]
+    return kept
