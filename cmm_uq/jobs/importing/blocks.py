@@ -133,8 +133,10 @@ class CutSheet:
 
     def place(self, i: int) -> dict[str, tuple[float, ...]]:
         """Start, end and direction of a line, where a row gives three figures after a word for one of them."""
-        text = " ".join(self.text(i, k) for k in range(len(self.sheet.rows[i])))
-        return places_in(text, self.sign)
+        return places_in(self.line(i), self.sign)
+
+    def line(self, row: int) -> str:
+        return " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
 
     def unit_in(self, rows: Sequence[int], i: int) -> WrittenUnit | None:
         """The unit that every cell of a column has after its figure."""
@@ -209,6 +211,12 @@ class CutSheet:
         block: Block | None = None
         self.kinds = [self._kind(i) for i in range(len(self.sheet.rows))]
         self._ruled = {self.sheet.lines[i] for i, kind in enumerate(self.kinds) if kind == "rule"}
+        kinds = [kind for kind in self.kinds if kind != "rule"]
+        most = max(2, sum(two == ("text", "figures") for two in pairwise(kinds)) // 2)
+        texts = Counter(self.line(i) for i, kind in enumerate(self.kinds) if kind == "text")
+        self._always = {
+            text for text, count in texts.items() if count > most
+        }  # above nearly all figures, as labels are
         for i, kind in enumerate(self.kinds):
             if kind == "text":
                 pending.append(i)
@@ -287,14 +295,14 @@ class CutSheet:
     def _titles(self, row: int) -> dict[str, str]:
         """Titles in a row of text, by the word that each begins with; without one where it has nothing else."""
         cells = [str(cell) for cell in self.sheet.rows[row] if cell != ""]
-        text = " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
+        text = self.line(row)
         if placed := bool(self.place(row)):
             text = text[: next(_named_places(text))[0].start()].strip()
         pairs = _PAIRS.split(text)
         parts = pairs if all(":" in pair for pair in pairs) else [text]
         parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
         titles = {(_begun(first[0]) if (first := WORD.search(part)) else part): part for part in parts}
-        return {**titles, "": text} if len(cells) == 1 or placed else titles
+        return {**titles, "": text} if placed or (len(cells) == 1 and text not in self._always) else titles
 
     def _head(self, pending: Sequence[int], numbers: Sequence[int]) -> list[int]:
         """Rows of a head at the end of rows of text, above a row with figures in these columns."""

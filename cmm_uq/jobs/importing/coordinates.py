@@ -14,7 +14,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet, heading
+from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet, figure, heading
 from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import without_unit
@@ -29,6 +29,7 @@ _FEW = 3  # places, which may be round by chance
 _UNIT_VECTOR = 2e-3  # to which directions have the length 1
 _LETTER = re.compile(r"(?<![A-Za-zÀ-ɏ])([xyzXYZ])(?![A-Za-zÀ-ɏ])")
 _EQUAL = re.compile(r"\s*[=:]\s*[-+]?\d")
+_LEVEL = re.compile(r"(?<![^\W\d_])([XYZ])\s*[=:]\s*([-+]?\d+(?:[.,]\d+)?)(?![^\s;)])")
 _COUNTED = re.compile(r"\d+|(?<![^\W\d_])[A-Za-z](?![^\W\d_])")
 
 
@@ -100,7 +101,7 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     rows = [row for row in rows if row not in grid.ends]
     columns = columns_in(grid, blocks, rows) if rows else []
     lengths = [c for c in columns if c.may_be_length]
-    named = _named(lengths)
+    named = _named(lengths, _levels(grid))
     triples, checked = _measured(named or _bare(lengths), grid.at(min(rows, default=0)))
     every = [c for own in triples for c in own.columns]
     if not triples or len({c.unit.name for c in every if c.unit}) > 1:
@@ -129,14 +130,34 @@ def _places(xyz: Floats) -> bool:
     return len(xyz) > 0 and not (len(xyz) > 2 and all(like(xyz[:, 0], xyz[:, k]) for k in (1, 2)))
 
 
-def _named(columns: Sequence[FigureColumn]) -> list[Triple]:
-    """Columns whose heads are the same but for a letter x, y or z."""
+def _levels(grid: CutSheet) -> dict[str, float]:
+    """Coordinates that all points have, where texts say one of an axis: ``taken at Z = -412.5``."""
+    own: dict[str, set[float]] = {}
+    for match in _LEVEL.finditer("\n".join(grid.line(row) for row, kind in enumerate(grid.kinds) if kind == "text")):
+        own.setdefault(match[1].lower(), set()).update((figure(match[2], grid.sign) or (np.nan,))[:1])
+    return {axis: values.pop() for axis, values in own.items() if len(values) == 1}
+
+
+def _named(columns: Sequence[FigureColumn], levels: Mapping[str, float]) -> list[Triple]:
+    """Columns whose heads are the same but for a letter x, y or z; of two of them with what is said of the third."""
     found: dict[tuple[str, str], dict[str, list[FigureColumn]]] = {}
     for c in columns:
         text = " ".join(without_unit(one.replace("\n", " "))[0].strip() for one in c.path).strip()
         for match in re.finditer("[xyzXYZ]", text):
             rest = text[: match.start()].casefold(), text[match.end() :].casefold()
             found.setdefault(rest, {}).setdefault(match[0].lower(), []).append(c)
+    for own in found.values() if all(len(own) < 3 for own in found.values()) else ():
+        if len(axes := {*"xyz"} - {*own}) == 1 and (axis := axes.pop()) in levels:
+            (first, *_) = own.values()
+            own[axis] = [
+                replace(
+                    c,
+                    i=-1,
+                    path=[f"{axis.upper()} = {levels[axis]:g}"],
+                    values=c.values * 0 + levels[axis] * (np.ptp(c.values) > _WIDE),
+                )
+                for c in first
+            ]
     whole = [(rest, own) for rest, own in found.items() if len(own) == 3 and len({*map(len, own.values())}) == 1]
     forms = [_COUNTED.sub("0", " ".join(rest)) for rest, _ in whole]
     if any(len(own) == 2 and _COUNTED.sub("0", " ".join(rest)) in forms for rest, own in found.items()):

@@ -23,6 +23,7 @@ LINE, RUN, POINT = "line", "run", "point"
 _MARKS = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
 _TOKEN = re.compile(r"[^\W_]+")
 _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
+_DATED = 8  # digits of a date
 _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
 LETTERS = {*"ABCDEFGHabcdefgh"}  # of balls
 # in names, ahead of their numbers
@@ -130,10 +131,13 @@ def hint(text: str, *, lengths: bool) -> str | None:
 
 def parts_of(label: Label) -> list[Label]:
     """The parts of names that are alike but for words and numbers; else what is ahead of a last number, and that number."""
-    for names in (label.values, tuple(_CAMEL.sub(" ", _GLUED.sub(" ", value)) for value in label.values)):
-        tokens = [[(m[0], m.start(), m.end()) for m in _TOKEN.finditer(name)] for name in names]
+    for cut in (str, lambda value: _CAMEL.sub(" ", _GLUED.sub(" ", value))):
+        if len(_TOKEN.findall(cut(label.values[0]))) < 2:
+            continue
+        names = tuple(map(cut, label.values))
+        tokens = [[(m[0], *m.span()) for m in _TOKEN.finditer(name)] for name in names]
         found: list[Label] = []
-        if len({*map(len, tokens)}) > 1 or len(tokens[0]) < 2:
+        if len({*map(len, tokens)}) > 1:
             continue
         before = ""
         for k, column in enumerate(zip(*tokens, strict=True)):
@@ -145,7 +149,7 @@ def parts_of(label: Label) -> list[Label]:
                     halves = [Label(before, values, "part")]
                 found += halves
             before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
-        if len(found) > 1 or (found and names is not label.values and found[0].values != label.values):
+        if len(found) > 1 or (found and cut is not str and found[0].values != label.values):
             return found
     last = [m for value in label.values if (m := re.fullmatch(r"(.*?([^\W\d_]*))[\W_]*(\d+)\D*", value))]
     if len(last) < len(label.values):
@@ -159,6 +163,8 @@ def parts_of(label: Label) -> list[Label]:
 def _halves(label: Label) -> list[Label]:
     """A part such as ``1A`` or ``A1`` as its number and its letter."""
     for form in (r"(.*\d)([A-Za-z])", r"([A-Za-z])(\d+)"):
+        if not re.fullmatch(form, label.values[0]):
+            continue
         halves = [re.fullmatch(form, value) for value in label.values]
         own = [tuple(m[k] for m in halves if m) for k in (1, 2)]
         if all(halves) and len({*own[0]}) > 1 < len({*own[1]}):
@@ -177,8 +183,11 @@ def fixes(a: Ints, b: Ints) -> bool:
     return len(pairs) == len(np.unique(a))
 
 
-def together(*every: Ints) -> Ints:
-    return codes([*zip(*(one.tolist() for one in every), strict=True)])
+def together(first: Ints, *others: Ints) -> Ints:
+    """A number for each of the values that there are together."""
+    for one in others:
+        first = np.unique(first * (int(one.max(initial=0)) + 1) + one, return_inverse=True)[1].astype(np.int64)
+    return first
 
 
 def varying(labels: Sequence[Label], *, lengths: bool) -> list[Counted]:
@@ -210,8 +219,10 @@ def in_turn(key: Ints) -> Ints:
 
 
 def numbered_runs(values: Sequence[str]) -> Ints:
-    """Numbers of runs: those that their labels have, else as they come."""
+    """Numbers of runs: those that their labels have, else as they come, as of dates."""
     numbers = [re.findall(r"\d+", value) for value in values]
-    if all(len(one) == 1 for one in numbers) and len({*values}) == len({one[0] for one in numbers}):
+    if all(len(one) == 1 and len(one[0]) < _DATED for one in numbers) and len({*values}) == len(
+        {one[0] for one in numbers}
+    ):
         return np.array([int(one[0]) for one in numbers])
     return codes(values) + 1

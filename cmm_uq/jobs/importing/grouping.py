@@ -25,6 +25,7 @@ from cmm_uq.jobs.importing.factors import (
     fixes,
     in_turn,
     numbered_runs,
+    together,
     varying,
 )
 
@@ -35,6 +36,7 @@ _COMPARED = 5000  # points of which the places are compared
 _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
 # what speaks for a way, the strongest first
 _TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED, _AT_LEAST = 6.0, 5.0, 4.0, 3.0, 2.0, 1.0
+_APART = 3  # times what repeats scatter, which is more than drift
 _FEW = 3  # points, which may be anything
 
 
@@ -47,11 +49,6 @@ class Grouping:
     measurement: Ints
     at: Ints  # a number for each place of each measurement
     point: Counted | None  # label of points; ``None`` where they count in turn
-
-    @property
-    def parts(self) -> bool:
-        """Whether parts of names tell measurements apart."""
-        return self.of is not None and self.of[0].sort == "part"
 
 
 def places(xyz: Floats) -> Ints:
@@ -77,16 +74,20 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
     if not found and place.max() + 1 == len(xyz) > _FEW and not any(way.rank for way in ways):
-        return {
-            "measurement": ["1"] * len(xyz),
-            "point": [f"{k + 1}" for k in range(len(xyz))],
-        }  # a list, and nothing else
-    ways = [way for way in ways if way.rank >= _NAMED and not (plate and way.parts and way.rank < _WORDS)]
+        return _told(Grouping(0.0, None, 0 * place, place, None), found, xyz)  # a list, and nothing else
+    ways = [
+        way
+        for way in ways
+        if way.rank >= _NAMED and not (plate and way.of and way.of[0].sort == "part" and way.rank < _WORDS)
+    ]
     best = max(ways, key=lambda way: (way.rank, -way.measurement.max()), default=None)
-    others = (way for way in ways if best and way.rank == best.rank and not _same(way.measurement, best.measurement))
-    if best is None or (best.rank <= _NAMED and any(others)):
+    if best is None:
         return None
-    return _told(best, found)
+    own = best.measurement
+    alike = (way.measurement for way in ways if way.rank == best.rank)
+    if best.rank <= _NAMED and not all(fixes(own, one) and fixes(one, own) for one in alike):
+        return None
+    return _told(best, found, xyz)
 
 
 def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
@@ -95,7 +96,7 @@ def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
     yield None
     yield from several
     for one, other in combinations(several if len(found[0][1]) <= _COMPARED else [], 2) if found else ():
-        both = _together(one[1], other[1])
+        both = together(one[1], other[1])
         if max(one[1].max(), other[1].max()) < both.max() < len(both) - 1:
             values = tuple(" ".join(pair) for pair in zip(one[0].values, other[0].values, strict=True))
             yield Label("", values, "part"), both, LINE if LINE in (one[2], other[2]) else None
@@ -114,13 +115,13 @@ def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Flo
         measurements = [np.zeros_like(place) if of is None else of[1]]
     else:  # words for placements hold, even where a plate has the same places in each, as in its own coordinates
         placed = counted(of[0], lengths=True) == LINE == of[2] and of[0].sort != "part"
-        measurements = [*([] if placed else [_of_places(of[1], place)]), of[1]]
+        measurements = [*([] if placed else [_of_places(of[1], place)]), *([] if of[0].sort == "turn" else [of[1]])]
     told: list[Grouping] = []
     for measurement in measurements:
-        at = _together(measurement, place)
+        at = together(measurement, place)
         each, several = int(at.max()) + 1, int(measurement.max()) > 0
         first = np.sort(np.unique(at, return_index=True)[1])
-        names = [f for f in found if fixes(at, f[1]) and _together(measurement, f[1]).max() + 1 == each]
+        names = [f for f in found if fixes(at, f[1]) and together(measurement, f[1]).max() + 1 == each]
         names.sort(key=lambda f: (f[2] != POINT, f[1].max(), f[0].sort == "part"))
         again = [f for f in names if f[1].max() + 1 < each]  # names that begin again in each measurement
         if each <= measurement.max() + 1 or (of is not None and of[0].sort == "turn" and each < 6):
@@ -159,16 +160,6 @@ def _rank(of: Counted, shape: str, *, named: bool, again: Counted | None) -> flo
         return (_NAMED if of[0].sort == "part" else _RESTARTED if of[0].sort == "column" else _MOVED) + word
     called = again is not None and again[2] == POINT and not {*again[0].values} <= LETTERS
     return _RESTARTED if again and of[2] is None and (of[0].sort != "part" or called) else 0.0
-
-
-def _together(a: Ints, b: Ints) -> Ints:
-    """A number for each pair."""
-    numbers: Ints = np.unique(a * (int(b.max()) + 1) + b, return_inverse=True)[1].astype(np.int64)
-    return numbers
-
-
-def _same(a: Ints, b: Ints) -> bool:
-    return fixes(a, b) and fixes(b, a)
 
 
 def _of_places(key: Ints, place: Ints) -> Ints:
@@ -231,24 +222,38 @@ def _on_a_ball(xyz: Floats) -> bool:
     return bool(distance.max() < _LARGEST_BALL_MM and np.ptp(distance) < _FORM_MM)
 
 
-def _told(way: Grouping, found: Sequence[Counted]) -> dict[str, list[str]]:
+def _elsewhere(xyz: Floats, at: Ints, label: Ints) -> bool:
+    """Whether what comes again at places (n, 3) lies closer together below each value of a label than in all."""
+    away = xyz - _means(xyz, at)
+    own = away - _means(away, both := together(at, label))
+    return 2 * (int(both.max()) + 1) <= len(at) and bool(np.abs(away).max() > _APART * np.abs(own).max())
+
+
+def _means(xyz: Floats, of: Ints) -> Floats:
+    """Of the rows (n, 3) of the same number, for each."""
+    sums = np.column_stack([np.bincount(of, own) for own in xyz.T])
+    return (sums / np.bincount(of)[:, None])[of]
+
+
+def _told(way: Grouping, found: Sequence[Counted], xyz: Floats) -> dict[str, list[str]]:
     """Names of measurement and point, and number of the repeat, of each place."""
     count, at, measurement = len(way.at), way.at, way.measurement
     named = [way.of[0].values] if way.of else []
-
-    def visits_told(*own: Counted) -> bool:
-        return bool(_together(at, own[0][1] if len(own) < 2 else _together(own[0][1], own[1][1])).max() + 1 == count)
-
     visits, run = in_turn(at), None
     if (most := int(visits.max())) > 1:
         runs = [f for f in found if f[2] == RUN or f[1].max() + 1 <= most]
-        apart = [f for f in runs if visits_told(f) and (f[2] == RUN or f[1].max() + 1 == most)]
+        apart = [f for f in runs if together(at, f[1]).max() + 1 == count and (f[2] == RUN or f[1].max() + 1 == most)]
         run = min(apart, key=lambda f: (f[1].max() + 1 != most, f[2] != RUN), default=None)
         above = [f for f in found if f[0].sort in ("title", "sheet", "head") and f is not way.of]
-        both = ((one, f) for one in above for f in runs if f is not one and run is None and visits_told(one, f))
-        if (pair := next(both, None)) is not None:  # as two stations from each of which all was measured twice
-            named, run, measurement = [*named, pair[0][0].values], pair[1], _together(measurement, pair[0][1])
-            at = _together(measurement, at)
+        # as two stations from each of which all was measured twice, or two artefacts
+        whole = ((one, f) for one in above for f in runs if f is not one and run is None)
+        pairs: list[tuple[Counted, Counted | None]]
+        pairs = [(one, f) for one, f in whole if together(at, one[1], f[1]).max() + 1 == count]
+        own = run if run and run[2] == RUN else None
+        pairs += [(one, own) for one in above if one[2] != RUN and _elsewhere(xyz, at, one[1])]
+        if pairs:
+            (one, run), *_ = pairs
+            named, measurement, at = [*named, one[0].values], together(measurement, one[1]), together(one[1], at)
     first = np.unique(measurement, return_index=True)[1]
     texts = [" ".join(one[k] for one in named) or "1" for k in first]
     columns = {"measurement": [texts[m] for m in measurement.tolist()]}

@@ -28,8 +28,11 @@ NAME = "name"  # of the point or feature, by which it may be numbered; no column
 
 
 def plain_words(text: str) -> list[str]:
-    plain = unicodedata.normalize("NFKD", text.casefold().translate(_ORDINAL))
-    return _WORDS.findall("".join(c for c in plain if not unicodedata.combining(c)))
+    plain = text.casefold()
+    if not plain.isascii():
+        plain = unicodedata.normalize("NFKD", plain.translate(_ORDINAL))
+        plain = "".join(c for c in plain if not unicodedata.combining(c))
+    return _WORDS.findall(plain)
 
 
 def unspaced(word: str) -> bool:

@@ -244,11 +244,6 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
     return found
 
 
-def without_sums(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
-    """Columns that are no mean, range or standard deviation of the others."""
-    return [c for c in columns if not c.sums_up([o for o in columns if o is not c])]
-
-
 def said_by(name: str, columns: Sequence[FigureColumn], more: str) -> str:
     """How a message asks for columns."""
     quoted = ", ".join(f'"{c.heading}"' for c in columns)

@@ -123,9 +123,12 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
     tokens = [_row_of(line) for line in lines]
     counted = [*map(bool, tokens)]
     spans: list[tuple[int, int]] = []  # where tokens stand, by the most common rows first
-    sizes = Counter(map(len, filter(None, tokens)))
-    for size, rows in sizes.most_common():
-        for start, end in _merged((a, b) for own in tokens if len(own) == size for a, b, _ in own):
+    forms = [tuple(text[-1].isdigit() for *_, text in own) for own in tokens]
+    sizes = Counter(filter(None, forms))
+    for form, rows in sizes.most_common():
+        for start, end in _merged(
+            span[:2] for own, its in zip(tokens, forms, strict=True) if its == form for span in own
+        ):
             over = [span for span in spans if start < span[1] and span[0] < end]
             if len(over) < 2 or 5 * rows > sizes.most_common(1)[0][1]:  # else as the name of a summary does
                 spans = [span for span in spans if span not in over]

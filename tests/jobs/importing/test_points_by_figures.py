@@ -113,3 +113,27 @@ def test_rows_of_a_plate_are_no_measurements_of_a_beam() -> None:
     found = imported(("Name;X;Y;Z\n" + "\n".join(rows_)).encode(), "a.csv", ImportKeys(unit="mm"))
     assert set(found.columns["measurement"]) == {1}
     assert len(set(found.columns["point"])) == 25
+
+
+def test_a_square_that_was_measured_again_is_not_one_that_was_turned() -> None:
+    """Six rows in turn, three times, would be a square and half of it, turned by half a turn about its middle."""
+    random = np.random.default_rng(7)
+    places = [(61, 118), (290, 118), (290, 271), (61, 271)] * 3
+    table = (",".join(f"{v + random.normal(0, 0.002):.4f}" for v in (*at, -37)) for at in places)
+    with pytest.raises(CmmUqError, match="nothing says which points belong to one measurement"):
+        imported(("X,Y,Z\n" + "\n".join(table)).encode(), "a.csv", ImportKeys(unit="mm"))
+
+
+@pytest.mark.parametrize(("away", "count"), [(0.02, 2), (0.0, 1)])
+def test_a_title_tells_two_artefacts_apart_at_one_place_where_what_was_repeated_lies_closer(
+    away: float, count: int
+) -> None:
+    random, lines = np.random.default_rng(8), ["Wegi: mm"]
+    for k in range(6):
+        lines += [f"Fiku: Q{k // 3 + 1}", f"Lomi: {20261001 + k}", "Nuvo,X,Y,Z"]
+        for name, x, y in (("K1", 50, 14), ("K2", 30, 98), ("K3", 72, 98)):
+            xyz = random.normal((x + away * (k // 3), y - away * (k // 3), 25), 0.001)
+            lines.append(",".join([name, *(f"{v:.4f}" for v in xyz)]))
+    found = imported("\n".join(lines).encode(), "a.csv", ImportKeys(unit="mm")).columns
+    assert len(set(found["measurement"])) == count
+    assert set(found["repeat"]) == set(range(1, 6 // count + 1))
