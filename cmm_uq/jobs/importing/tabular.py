@@ -15,7 +15,6 @@ import re
 import warnings
 import zipfile
 import zlib
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import compress, islice, pairwise
 from typing import Any
@@ -121,25 +120,24 @@ def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
     lines = [_WIDE.sub(rf"\g<0>{_HELD}", line.expandtabs()) for line in lines]
     lines = [_BETWEEN.sub(" ", line) if len(_BETWEEN.findall(line)) > 1 else line for line in lines]
     tokens = [_row_of(line) for line in lines]
-    counted = [*map(bool, tokens)]
     spans: list[tuple[int, int]] = []  # where tokens stand, by the most common rows first
-    forms = [tuple(text[-1].isdigit() for *_, text in own) for own in tokens]
-    sizes = Counter(filter(None, forms))
-    for form, rows in sizes.most_common():
-        for start, end in _merged(
-            span[:2] for own, its in zip(tokens, forms, strict=True) if its == form for span in own
-        ):
+    alike: dict[tuple[bool, ...], list[tuple[int, int]]] = {}  # by where their figures are
+    for own in filter(None, tokens):
+        alike.setdefault(tuple(text[-1].isdigit() for *_, text in own), []).extend(span[:2] for span in own)
+    sizes = {form: len(own) // len(form) for form, own in alike.items()}
+    for form, rows in sorted(sizes.items(), key=lambda one: -one[1]):
+        for start, end in _merged(alike[form]):
             over = [span for span in spans if start < span[1] and span[0] < end]
-            if len(over) < 2 or 5 * rows > sizes.most_common(1)[0][1]:  # else as the name of a summary does
+            if len(over) < 2 or 5 * rows > max(sizes.values()):  # else as the name of a summary does
                 spans = [span for span in spans if span not in over]
                 spans.append((min([start, *(a for a, _ in over)]), max([end, *(b for _, b in over)])))
     spans = _merged(spans)
-    for own, is_row, line in zip(tokens, counted, lines, strict=True):
-        phrases = own if is_row else [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line)]
-        if not is_row and len(phrases) < 2 and (not phrases or phrases[0][0] < 8):
+    for own, line in zip(tokens, lines, strict=True):
+        phrases = own or [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line)]
+        if not own and len(phrases) < 2 and (not phrases or phrases[0][0] < 8):
             yield [line.strip().replace(_HELD, "")]
             continue
-        if not is_row and len(phrases) == len(spans):
+        if not own and len(phrases) == len(spans):
             yield [text.replace(_HELD, "") for _, _, text in phrases]
             continue
         cells = [""] * max(1, len(spans))
