@@ -65,6 +65,8 @@ def _without_mark(content: bytes) -> str:
     head = content[:4096]
     if len(head) >= 4 and head.count(0) > len(head) // 4:
         return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
+    if content.isascii():
+        return "utf-8"
     japanese = len(_JAPANESE.findall(content)) > len(_ACCENTED.findall(_JAPANESE.sub(b"", content)))
     paired = len(_PAIRED.findall(content)) > 2 * len(_PAIRED.sub(b"", content).translate(None, bytes(range(128)))) + 3
     for codec in ("utf-8", *(["cp932"] if japanese else []), *(["cp949", "gb18030"] if paired else [])):

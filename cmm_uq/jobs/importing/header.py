@@ -323,7 +323,8 @@ def text_of(cell: Cell) -> str:
 def is_summary(row: Sequence[Cell]) -> bool:
     """Whether one of the first two cells is a word for a figure of other rows, or the first has a unit: ``Form (µm)``."""
     labels = [cell for cell in row if cell != ""][:2]
-    if any(isinstance(cell, str) and " ".join(plain_words(cell)) in words_of("rows")["summary"] for cell in labels):
+    words = (" ".join(plain_words(cell)) for cell in labels if isinstance(cell, str) and not cell[-1:].isdigit())
+    if any(own in words_of("rows")["summary"] for own in words):
         return True
     label = text_of(labels[0]) if labels else ""
     return label.endswith((")", "]")) and not re.search(r"\d", label) and without_unit(label)[1] is not None
