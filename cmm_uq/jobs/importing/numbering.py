@@ -59,12 +59,16 @@ def completed(
 ) -> tuple[dict[str, Floats], list[Fact]]:
     """Numbers (n,) of every point (n, 3), where the columns of the file leave some out or let two points be one."""
     count = len(xyz)
-    if {MEASUREMENT, POINT} <= {*columns} and len(
-        {*zip(*(own.tolist() for own in columns.values()), strict=True)}
-    ) == count:
+    both = {MEASUREMENT, POINT} <= {*columns}
+    if both and len({*zip(*(own.tolist() for own in columns.values()), strict=True)}) == count:
         return dict(columns), []
     every = [*(Label(name, tuple(f"{one:g}" for one in values)) for name, values in columns.items()), *labels]
-    found, facts = numbered_points(every, xyz, keys, place)
+    try:
+        found, facts = numbered_points(every, xyz, keys, place)
+    except NotReadError:
+        if both:
+            return dict(columns), []  # of which two rows are one, as is said where they are taken
+        raise
     return {**found, **(columns if keys.points_per_measurement is not None else {})}, facts
 
 
