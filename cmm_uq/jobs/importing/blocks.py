@@ -46,6 +46,7 @@ _FORMULA = re.compile(r"(?<=\S)\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that say
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
+_AXIS_LETTER = re.compile(r"\b[XYZ]\b")
 _MEASURED = 0.05  # figures printed finer are no planned places
 _POWER = 99  # of ten, beyond which a text is no figure
 WORD = re.compile(r"[^\W\d_]+")
@@ -267,7 +268,11 @@ class CutSheet:
         other = next((name for name in ("end", "direction") if len(columns.get(name, ())) == 3), "")
         if other and len(columns["start"]) == 3:
             return self._filled_places(block, (*columns["start"], *columns[other]), other)
-        axes = [(i, path[-1].strip().upper()) for i, path in enumerate(block.paths) if path]
+        last = [path[-1].strip().upper() if path else "" for path in block.paths]
+        for i, text in enumerate(last):
+            if last[i + 1 : i + 3] == ["", ""] and "".join(_AXIS_LETTER.findall(text)) == "XYZ":
+                last[i : i + 3] = "XYZ"  # one head over three
+        axes = [*enumerate(last)]
         six = [i for i, text in axes if len(text) == 1 and text in "XYZ"]
         fine = any((self.figure(row, i) or (0, 1))[1] < _MEASURED for row in block.rows for i in six)
         if fine or "".join(text for i, text in axes if i in six) != "XYZXYZ":
@@ -322,7 +327,8 @@ class CutSheet:
             over = [k for k in filled if k in numbers]
             apart = not head and (len(filled) < 2 or not over) and filled != over
             # the last of them stands over all that follow
-            grouped = len(filled) > 2 and filled == [*range(len(filled))]
+            first = head and 0 in numbers and not self.text(head[0], 0) and unit_of(texts[:1])  # named there alone
+            grouped = filled == [*range(len(filled))] and (first or len(filled) > 2)
             ahead = head and ((2 * filled[-1] < numbers[-1] and not grouped) or texts[0].endswith(":") or filled == [0])
             if apart or ahead or any(f is not None and f[1] < 1 for f in self.figures[row]):
                 break

@@ -19,6 +19,7 @@ from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, sem
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing.blocks import figure
 from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
 from cmm_uq.jobs.importing.factors import Label
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, NotReadError, Sheet, WrittenUnit
@@ -34,10 +35,12 @@ from cmm_uq.jobs.importing.header import (
     text_of,
 )
 from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
+from cmm_uq.jobs.importing.roles import said
 
 LARGEST_MACHINE_MM = 40_000.0  # longest diagonal of a measuring machine: gantries of 30 m are the largest made
 SIGNS = {".": say("point"), ",": say("comma")}
 _SHOWN = 15
+_LENGTHS = "Say which columns are lengths: columns = { length_mm = […] }"
 _DECIMAL = re.compile(r"\d[.,]\d")
 
 Written = Mapping[str, Sequence[tuple[Floats, WrittenUnit | None, int]]]
@@ -84,6 +87,7 @@ def columns_of(
     )
     written = {name: table.written(name, sign) for name in plain}
     _refuse_lengths_along_axes(written, table.start)
+    _refuse_places_of_lengths(written, table, sign)
     unit, of_unit = table.lengths_unit(keys, written, reach_mm)
     values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}
     numbers, facts = table.numbers(sign)
@@ -109,8 +113,18 @@ def _refuse_lengths_along_axes(written: Written, place: str) -> None:
     xyz = [np.column_stack([values for values, _, _ in written[axis]]) for axis in COORDINATES if written.get(axis)]
     alike = len(xyz) == 3 and all(np.abs(xyz[0] - own).max() <= 0.04 + 0.002 * np.abs(own).max() for own in xyz[1:])
     if alike and len(xyz[0]) > 2 and np.ptp(xyz[0]) > 1:
-        fix = "Say which columns are lengths: columns = { length_mm = […] }"
-        raise NotReadError("X, Y and Z have the same lengths in each row", where=place, fix=fix)
+        raise NotReadError("X, Y and Z have the same lengths in each row", where=place, fix=_LENGTHS)
+
+
+def _refuse_places_of_lengths(written: Written, table: ExportTable, sign: str) -> None:
+    """Whole places, beside which measured lengths stand, are where those begin, and were not measured."""
+    used, headings = {i for own in table.header.columns.values() for i in own}, table.header.headings
+    beside = [i for i, head in enumerate(headings) if i not in used and said([head]) == "measured"]
+    whole = all(np.all(values % 1 == 0) for axis in COORDINATES for values, _, _ in written.get(axis, ()))
+    for i in beside if whole else ():
+        if (first := figure(table.cells[i][0], sign)) and first[1] < 1 < first[0]:
+            what = f"X, Y and Z are whole, and {headings[i]!r} was measured there"
+            raise NotReadError(what, where=table.start, fix=_LENGTHS)
 
 
 class ExportTable:

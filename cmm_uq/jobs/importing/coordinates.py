@@ -106,6 +106,8 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     every = [c for own in triples for c in own.columns]
     if not triples or len({c.unit.name for c in every if c.unit}) > 1:
         return None
+    if all(c.step >= 1 for c in every) and any(c.role == "measured" and c.step < 1 < c.values[0] for c in lengths):
+        return None  # whole places, at which lengths were measured
     reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
     alone = not checked and sum(own.wide for own in named) == 1
     reading.beside_lengths = alone and bool(_COUNTED.sub("", triples[0].head).strip())

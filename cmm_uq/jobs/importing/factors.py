@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -66,16 +67,27 @@ def way_of(value: str) -> int:
     return own.pop() if len(own) == 1 else 0
 
 
-def senses(labels: Sequence[Label], targets: Ints) -> list[int] | None:
-    """Sense of travel by the label that names both as often at nearly each target; ``None`` where none does."""
-    for own in map(ways_of, (label.values for label in labels)):
+def senses(labels: Sequence[Label], targets: Sequence[float]) -> list[int] | None:
+    """Sense of travel by the label that names both as often at nearly each target, else whose targets rise and fall."""
+    letters = (label.values for label in labels if label.sort == "column" and not any(map(str.isdigit, label.values)))
+    for own in (*map(ways_of, (label.values for label in labels)), *(_turns(values, targets) for values in letters)):
         if own is not None:
-            both = Counter[int]()
-            for target, way in zip(targets.tolist(), own, strict=True):
+            both = Counter[float]()
+            for target, way in zip(targets, own, strict=True):
                 both[target] += way
             if sum(n == 0 for n in both.values()) >= 0.8 * len(both):
                 return own
     return None
+
+
+def _turns(values: Sequence[str], targets: Sequence[float]) -> list[int] | None:
+    """Sense of travel where the targets of the one label rise in turn and those of the other fall."""
+    steps: dict[str, set[bool | None]] = {value: set() for value in values}
+    for k, (value, after) in enumerate(pairwise(values)):
+        if value == after:
+            steps[value].add(targets[k] < targets[k + 1] if targets[k] != targets[k + 1] else None)
+    rises = sorted(map(list, steps.values()), key=str)
+    return [1 if True in steps[value] else -1 for value in values] if rises == [[False], [True]] else None
 
 
 def counted(label: Label, *, lengths: bool) -> str | None:
@@ -105,8 +117,8 @@ def counting(values: Sequence[str]) -> bool:
 
 
 def numberless(text: str) -> str:
-    """A text with one figure for each number, of whatever form."""
-    return re.sub(r"\d+", "0", unicodedata.normalize("NFKC", text))
+    """A text with one figure for each number, of whatever form, as I, II and IV."""
+    return re.sub(r"\d+|\b(?:I{1,3}|IV|VI{1,3}|IX)\b", "0", unicodedata.normalize("NFKC", text))
 
 
 def hint(text: str, *, lengths: bool) -> str | None:

@@ -121,7 +121,7 @@ def place_of(text: str) -> tuple[Floats, Floats]:
 
 
 _SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
-_LINEAR, _TRIPLE = {"linear", ""}, 3
+_LINEAR, _TRIPLE = {"linear", "rtl", ""}, 3
 _AGAIN, _SHOWN = "Export the runs anew", 40
 HEADINGS = [
     "measurement", "point", "repeat", *(f"{a}_mm" for a in AXES), "reading_um", *(f"read_{a}" for a in AXES),
@@ -252,7 +252,7 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
         [find(f"{label.words} {value}") for value in label.values] for find in (axis_in, _letter_in) for label in labels
     ]
     axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
-    ways = senses(labels, codes(target.tolist()))
+    ways = senses(labels, target.tolist())
     parts = [part for label in labels for part in (label, *parts_of(label))]
     run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
     key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
@@ -278,7 +278,7 @@ def _angle_in(sheets: Sequence[Sheet]) -> str | None:
     """A text that says that deviations are angles."""
     known = [word for words in words_of("angles").values() for word in words]
     for text in (cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str) and cell):
-        plain = f" {' '.join(plain_words(text))} "
+        plain = f" {' '.join(plain_words(text))} ".replace(" pitch error table ", " ")  # of a screw
         if any(f" {word} " in plain or (unspaced(word) and word in plain) for word in known):
             return text
     return None

@@ -23,14 +23,14 @@ from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
-from cmm_uq.jobs.importing.factors import codes, hint
+from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import places
 from cmm_uq.jobs.importing.header import Header, is_summary
-from cmm_uq.jobs.importing.lengths.evidence import sums_of, without_means
+from cmm_uq.jobs.importing.lengths.evidence import sums_of
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lines_and_runs
-from cmm_uq.jobs.importing.lengths.run_columns import runs_in
+from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import MeasuredLengths, axis_in
 from cmm_uq.jobs.importing.numbering import numbered_points
@@ -175,13 +175,13 @@ def _refuse_unmatched(grids: Sequence[CutSheet], keys: Mapping[str, Sources], wh
 
 
 def _refuse_same_lines(chosen: Sequence[Found], where: str) -> None:
-    """Sheets with the same lengths beside the same names are two recordings, unless their names count lines or runs."""
+    """Sheets with the same lengths on lines of the same names are two recordings, unless their names count lines or runs."""
     sheets: dict[str, list[object]] = {}
     for reading, grid in chosen:
-        columns = [{key: text for key, text in own.items() if key[0] == "column"} for own in reading.labels]
-        lines = [key for key in columns[0] if hint(key[1].partition(" ")[2], lengths=True) == "line"]
-        labels = [[own.get(key) for key in lines or own] for own in columns]
-        sheets.setdefault(grid.sheet.name, []).append(sorted(map(str, labels)))
+        of_line = [label.values for label in reading.every_label if counted(label, lengths=True) == "line"]
+        of_line = of_line or [label.values for label in reading.every_label if label.sort == "column"]
+        lengths = [own[0] for own in reading.figures]
+        sheets.setdefault(grid.sheet.name, []).append(sorted(map(str, zip(lengths, *of_line, strict=True))))
     words = any(hint(name, lengths=True) or axis_in(name) or name.strip().upper() in {*"XYZ"} for name in sheets)
     hinted = words or len({re.sub(r"\d+", "0", name) for name in sheets}) == 1
     first, *others = sheets
@@ -206,7 +206,7 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         usable = [
             row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
         ]
-        own = _layout(grid, without_means(grid, usable)) if usable else []
+        own = _layout(grid, usable) if usable else []
         readings: list[SheetReading] = []
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
@@ -231,6 +231,8 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
             reading = max(readings, key=lambda one: len({*one.rows, *one.others}))
             reading.lines = [sheet.lines[row] for row in reading.rows]
             found.append((reading, grid))
+        elif own:
+            problem = problem or circle_in(grid, blocks, own)
     if problem is not None and not found:
         raise problem
     return found

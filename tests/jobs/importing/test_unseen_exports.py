@@ -13,7 +13,7 @@ read them, but for what ``ASKED`` and ``REFUSED`` say; places of lines are asked
 
 Ninety more were written for development in November 2026, sixty of them tables of lengths and runs, of which 30 came out as
 their authors have it at the first try and 3 were read wrongly; fourteen that each show another assumption to be wrong stand
-in ``length_exports``.
+in ``length_exports``, with four of thirty-six more that were tried when it was made.
 
 Thirty of these ninety are lists of points: 11 of them were read as their authors have them, 4 wrongly. Twelve of those stand
 in ``point_exports``: pages that go on, results below points, holes across with a row for each axis, sheets of placements,
@@ -60,7 +60,7 @@ ASKED = {"10": "unit", "15": "unit", "C06": "unit", "C13": "unit", "C26": "unit"
 """By number: what is asked beside where lines lie, of files that name no unit."""
 REFUSED = {
     "S07": "is no measured length",
-    "S29": "no line names",
+    "S29": "goes round a circle",
     "T21": "no line names",
     "T22": "no line names",
     "T23": "no column is",
@@ -74,6 +74,7 @@ REFUSED = {
     "V21": "no line names",
     "V28": "no line names",
     "V29": "each a recording of its own",
+    "W19": "each a recording of its own",
 }
 """Of exports that are not read, what is said."""
 PLACED = {
@@ -85,6 +86,7 @@ PLACED = {
     "02": [60, 350, -250],
     "S01": [40, 500, -300],
     "S05": [60, 400, -300],
+    "W21": [150, 350, 200],
 }
 """Start of the first line, of files that say where their lines lie."""
 GROUPED = {"18": 2}  # points of which the file does not say how many are one measurement, and their distances do

@@ -7,30 +7,22 @@ ranges and extremes follow from others, and limits from the reference.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations, permutations
+from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
-from cmm_uq.jobs.importing.blocks import CutSheet
 from cmm_uq.jobs.importing.factors import numberless, way_of
 from cmm_uq.jobs.importing.roles import FigureColumn
 
-_REPEATS = 20  # most of which a row below them is the mean
 _LEAST = 4  # rows by which a column is known to follow from another
 
 
-@dataclass(frozen=True)
-class ColumnDifference:
-    """``deviation`` times ``factor`` is ``measured`` minus ``base`` to the printed digits, in all rows."""
-
-    deviation: FigureColumn
-    measured: FigureColumn
-    base: FigureColumn
-    factor: float
+Difference = tuple[FigureColumn, FigureColumn, FigureColumn]
+"""A deviation, what was measured and what it is less of, to the printed digits in all rows."""
 
 
-def differences(group: Sequence[FigureColumn], small: Sequence[FigureColumn]) -> list[ColumnDifference]:
+def differences(group: Sequence[FigureColumn], small: Sequence[FigureColumn]) -> list[Difference]:
     """Columns of ``group`` whose differences stand in ``small`` ones, and are more than their rounding."""
     found = []
     for d in small:
@@ -42,7 +34,7 @@ def differences(group: Sequence[FigureColumn], small: Sequence[FigureColumn]) ->
             for f in d.factors(m):
                 own, slack = d.values[at] * f, d.slack(m, b, f)
                 if abs(apart - own) <= slack < abs(own) and d.agrees(m, b, f):
-                    found.append(ColumnDifference(d, m, b, f))
+                    found.append((d, m, b))
     return found
 
 
@@ -88,19 +80,12 @@ def families(columns: Sequence[FigureColumn]) -> list[list[FigureColumn]]:
 
 
 def without_derived(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
-    """Columns that are no mean, range, deviation or extreme of others, nor the mean or difference of two such."""
-    left, out = [*columns], list[FigureColumn]()
+    """Columns that are no mean, range, deviation or extreme of others."""
+    left = [*columns]
     for c in columns:
         others = [o for o in left if o is not c]
         if any(c.sums_up(own, worst=True) for own in sets_of(others, c)):
             left.remove(c)
-            out.append(c)
-    for c in [*left]:
-        step = 0.55 * c.step
-        for a, b in combinations((o.values for o in out), 2):
-            sums = ((a + b) / 2, a - b, b - a, np.abs(a - b))
-            if c in left and any(np.all(np.abs(c.values - one) <= step + max(o.step for o in out)) for one in sums):
-                left.remove(c)
     return left
 
 
@@ -117,23 +102,4 @@ def sets_of(columns: Sequence[FigureColumn], beside: FigureColumn) -> Iterator[S
         yield [c for c in columns if c.path[0] == part]
     yield from ([c for c in columns if way_of(c.heading) == sense] for sense in (1, -1))
     yield from families(columns)
-    before = [c for c in columns if c.i < beside.i]
-    yield before
-
-
-def without_means(grid: CutSheet, rows: Sequence[int]) -> list[int]:
-    """Rows that are no mean of those above them, with a word where those are numbered."""
-    kept, above = list[int](), list[int]()
-    for row in rows:
-        fine = [k for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1]
-        named = any(
-            grid.figure(row, k) is None and grid.text(row, k) and all(grid.text(r, k).isdigit() for r in above)
-            for k in range(len(grid.figures[row]) if len(above) > 1 else 0)
-        )
-        own = [(grid.column(above, k)[0].mean(), *grid.column([row], k)) for k in fine if named]
-        if own and all(abs(mean - value[0]) <= 1.05 * step[0] for mean, value, step in own):
-            above = []
-        else:
-            kept.append(row)
-            above = [*above, row][-_REPEATS:]
-    return kept
+    yield [c for c in columns if c.i < beside.i]

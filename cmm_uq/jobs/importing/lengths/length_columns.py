@@ -15,7 +15,7 @@ from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading, unit_of
 from cmm_uq.jobs.importing.factors import hint, numberless
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, WrittenUnit
 from cmm_uq.jobs.importing.lengths.evidence import (
-    ColumnDifference,
+    Difference,
     differences,
     families,
     follows,
@@ -51,7 +51,7 @@ def lengths_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
             fitting[0].append(one)
         else:
             groups.append([one])
-    groups = [own for own in groups if len(own) > 1 or own[0].role in (*BASES, "measured") or own[0].is_length]
+    groups = [own for own in groups if len(own) > 1 or _alone(own[0], columns)]
     _refuse_far(grid, rows, groups)
     readings = [found for own in groups if (found := _lengths(grid, rows, columns, own)) is not None]
     return max(readings, key=lambda found: (found.checked, len(found.figures)), default=None)
@@ -76,8 +76,14 @@ def _sized(column: FigureColumn) -> bool:
     if column.role == "deviation" or not column.may_be_length or column.minute:
         return False
     whole = column.role in BASES or (column.role is None and not column.counts)
-    positive = np.nanmin(column.values) > 0 or column.role == "target"
+    positive = np.nanmin(column.values) >= (0 if column.role == "target" else 1e-9)
     return bool((column.step < 1 or whole) and positive and np.nanmedian(np.abs(column.values)) >= 0.5)
+
+
+def _alone(column: FigureColumn, columns: Sequence[FigureColumn]) -> bool:
+    """Whether words call it a length, or a deviation beside it has one reference."""
+    called = column.role in (*BASES, "measured") or column.is_length
+    return called or any(c.role == "deviation" and steady(column, c) for c in columns)
 
 
 def _refuse_far(grid: CutSheet, rows: Sequence[int], groups: Sequence[Sequence[FigureColumn]]) -> None:
@@ -86,18 +92,15 @@ def _refuse_far(grid: CutSheet, rows: Sequence[int], groups: Sequence[Sequence[F
     lone = [c for own in groups for c in own if c.role == "measured" and all(o.role not in BASES for o in own)]
     for k, row in enumerate(rows if bases and lone else ()):
         base, length = bases[0].values[k], lone[0].values[k]
-        if not np.isfinite(base):
-            raise grid.no_value(row, bases[0].i)
         if not like(bases[0].values[k : k + 1], lone[0].values[k : k + 1], _FAR):
             what = f"{length:.6g} mm is no measured length of {base:.6g} mm"
             raise NotReadError(what, where=grid.at(row, lone[0].i), fix=_NAME)
 
 
-def settled_base(group: Sequence[FigureColumn], pairs: Sequence[ColumnDifference]) -> FigureColumn | None:
+def settled_base(group: Sequence[FigureColumn], pairs: Sequence[Difference]) -> FigureColumn | None:
     """The column from which others differ by deviations beside them: it comes again, else by words, else by their sign."""
     of: dict[int, set[int]] = {c.i: set() for c in group}
-    for pair in pairs:
-        a, b = pair.measured, pair.base
+    for _, a, b in pairs:
         if scatters(b, a) or (not scatters(a, b) and _rank(a) < _rank(b)):
             a, b = b, a
         of[b.i].add(a.i)
@@ -121,20 +124,15 @@ def _base(
     open_ = without_derived([c for c in group if c.role is None])
     again = [c for c in (*named, *open_) if any(scatters(o, c) for o in group)]
     fine = [c for c in again if not c.round]
-    others = [c for c in open_ if c.step < 1]
     base = base or next((c for c in named if c.role == "reference"), None)
     if base is None and len(fine) == 1:
         base = fine[0]
-    elif base is None and named and measured and others:
+    elif base is None and named and measured and any(c.step < 1 for c in open_):
         return None  # which of both is calibrated nobody says
     base = base or next(iter((*named, *(again if not fine else ()))), None)
-    if base is None and measured and open_:
-        base = others[0] if len(others) == 1 else open_[0] if not others and len(open_) == 1 else None
-        if base is None or (others and not (base.is_length or len(open_) > 1)):
-            return None
-    elif base is None and len(group) == len(open_) == 1 and any(c.deviates and not steady(group[0], c) for c in small):
+    if base is None and len(group) == len(open_) == 1 and any(c.deviates and not steady(group[0], c) for c in small):
         base = open_[0]
-    elif base is None and open_ and len(group) > len(open_) + len(measured):
+    elif base is None and open_ and len(group) > len(open_):
         return None
     rest = [c for c in group if c is not base and (c not in named or (base is not None and scatters(c, base)))]
     rest = [c for c in rest if c.role == "measured" or base is None or c.step < min(1, 20 * base.step)]
@@ -161,6 +159,7 @@ def _lengths(
     if not deviations:
         checked += sum(c.sums_up(source, worst=True) for c in columns if c.role == "summary")
         of_all = [steady(source[0], c) for c in small] if base is None and len(source) == 1 else []
+        checked += sum(map(bool, of_all))
         base = base or _reference_in_head(grid, rows, source) or next(filter(None, of_all), None)
     named = {c.unit.name for c in source if c.unit} if deviations else set()
     source = source if side_by_side(source) else counted_heads(source)
@@ -178,27 +177,22 @@ def _lengths(
     reading.collect(grid, rows, columns)
     if base is None and len(rows) < _MANY and not reading.on_lines:
         return None
-    _fill(reading, grid, rows, base, source)
-    return reading
+    return _filled(reading, grid, rows)
 
 
-def _fill(
-    reading: SheetReading,
-    grid: CutSheet,
-    rows: Sequence[int],
-    base: FigureColumn | None,
-    source: Sequence[FigureColumn],
-) -> None:
-    """Observations of rows; an error where a length has no reference, and others have one."""
+def _filled(reading: SheetReading, grid: CutSheet, rows: Sequence[int]) -> SheetReading:
+    """With the observations of rows; an error where a length has no reference, and others have one."""
+    base, source = next(iter(reading.taken["reference_mm"]), None), reading.source
     for k, row in enumerate(rows):
+        reference = np.nan if base is None else float(base.values[k])
         for c in source:
-            reference = np.nan if base is None else float(base.values[k])
             if not np.isfinite(c.values[k]):
                 reading.blank.append((row, c.i))
             elif base is None or np.isfinite(reference):
                 reading.add(row, k, c, source, (reference, float(c.values[k])))
             elif not grid.other_quantity(row) and said([grid.text(row, 0)]) != "summary":
                 raise grid.no_value(row, base.i)
+    return reading
 
 
 def _plain(
@@ -257,16 +251,13 @@ def _checked(
     grid: CutSheet, rows: Sequence[int], small: Sequence[FigureColumn], source: Sequence[FigureColumn], base: FigureColumn
 ) -> tuple[int, float]:  # fmt: skip
     """How many deviations are measured minus reference, and by which factor; an error where one is not."""
-    for d in small:
-        if (
-            d.role == "deviation"
-            and np.any(d.values)
-            and not any(_stands(d, source, base, f) for f in d.factors(source[0]))
-        ):
+    hits: list[float] = []
+    for d in (one for one in small if np.any(one.values)):
+        own = [f for f in d.factors(source[0]) if _stands(d, source, base, f)]
+        if d.role == "deviation" and not own:
             what = f"{d.heading!r} is not measured minus reference: one of the columns is another"
             raise NotReadError(what, where=grid.at(rows[0]), fix=said_by("deviation_um", [d], ", or length_mm"))
-    pairs = [(d, m, f) for d in small if np.any(d.values) for m in source for f in d.factors(m)]
-    hits = [f for d, m, f in pairs if d.agrees(m, base, f) or d.agrees(base, m, f)]
+        hits += own
     return len(hits), hits[-1] if hits else 0.0
 
 

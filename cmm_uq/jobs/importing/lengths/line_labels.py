@@ -68,14 +68,9 @@ def _told_apart(
         return f[2] == POINT, run is not None and fixes(f[1], run[1]), rank[f[0].sort], int(f[1].max())
 
     columns = [f for f in others if f[0].sort == "column"]
-    others = [
-        f for f in others if f not in columns or not any(_says(g, f) for g in (*columns, *([run] if run else [])))
-    ]
+    more = [g[1] for g in (*columns, *([run] if run else []))]  # which may say what another says, and more
+    others = [f for f in others if f not in columns or not any(g.max() > f[1].max() and fixes(g, f[1]) for g in more)]
     named = [f for f in others if f[0].sort in ("column", "part") and not _digits(f[0])]
-    if run is None and not line:  # what counts is a run, where a name beside it tells all others apart
-        counts = [f for f in others if f[0].sort in ("column", "part") and _digits(f[0])]
-        runs = [f for f in counts if any(apart(a[1], f[1]) == count > apart(a[1]) for a in others if not _digits(a[0]))]
-        run = runs[0] if len({f[1].tobytes() for f in runs}) == 1 else None
     for one in sorted(others, key=order):
         if apart() == count or apart(one[1]) == apart():
             continue
@@ -102,11 +97,6 @@ def _one_run(labels: Sequence[Label], runs: Sequence[Counted], place: str) -> Co
         what = f"{(columns or [runs[0][0].words])[0]!r} counts runs, and so do {heads or 'other'} columns"
         raise NotReadError(what, where=place, fix="Name one of them alone: columns")
     return run
-
-
-def _says(one: Counted, other: Counted) -> bool:
-    """Whether one label says the other, and more."""
-    return one is not other and one[1].max() > other[1].max() and fixes(one[1], other[1])
 
 
 def _digits(label: Label) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,11 +10,13 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import Block, CutSheet
-from cmm_uq.jobs.importing.factors import codes, senses, way_of, ways_of
+from cmm_uq.jobs.importing.factors import senses, way_of, ways_of
+from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, without_derived
 from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, settled_base
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like
 
+_MOST_OF_A_TURN, _DEGREES = 300, re.compile(r"°|\bdeg", re.IGNORECASE)
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 
 
@@ -36,7 +39,7 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
     reached = _reached(columns, target, values)
     given = differences([filled, *reached], small)
     if given:
-        source = [c for c in small if any(c is one.deviation for one in given)]
+        source = [c for c in small if any(c is one[0] for one in given)]
         reading.checked = len(source)
     elif reached and not any(ways[c.i] for c in source):
         source, reading.positions = [replace(c, values=c.values - values) for c in reached], True
@@ -50,7 +53,7 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
                 reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
             else:
                 reading.blank.append((row, c.i))
-    return reading if senses(reading.every_label, codes([one[0] for one in reading.figures])) is not None else None
+    return reading if senses(reading.every_label, [one[0] for one in reading.figures]) is not None else None
 
 
 def _ways(columns: Sequence[FigureColumn]) -> dict[int, int]:
@@ -66,9 +69,12 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     large = [c for c in columns if np.ptp(c.values[np.isfinite(c.values)]) > 1 and not c.minute]
     called = [c for c in large if c.role in ("target", "nominal")]
     if called:
-        return min(called, key=lambda c: c.counts)  # and not their numbers
+        return min(called, key=lambda c: (c.counts, not c.round))  # and not their numbers, nor what was reached
     large = [c for c in large if c.role in (None, "measured", "reference") and not c.counts]
     near = [c for c in large if any(o is not c and like(c.values + 1000, o.values + 1000) for o in large)]
+    alone = [c for c in near if not way_of(c.heading)]
+    if len(alone) == 1 and len(near) > 2:
+        return alone[0]  # beside what was reached there and back
     small = [c for c in columns if c not in near and c.role != "summary"]
     if near and (base := settled_base(near, differences(near, small))) is not None:
         return base
@@ -78,6 +84,18 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
 
 def _reached(columns: Sequence[FigureColumn], target: FigureColumn, values: Floats) -> list[FigureColumn]:
     """Positions that were reached."""
-    near = [c for c in columns if c is not target and c.role in (None, "measured", "reference")]
+    near = [c for c in columns if c is not target and c.role not in ("summary", "deviation")]
     near = [c for c in near if c.step < 1 and like(c.values, values, _OFF_MM)]
     return without_derived(near) if np.nanmax(np.abs(values)) > 10 * _OFF_MM else []
+
+
+def circle_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> NotReadError | None:
+    """The error for radii by angle, which are of a circular test, and no places."""
+    columns = columns_in(grid, blocks, rows)
+    spans = ((c.heading, np.nanmax(c.values) - np.nanmin(c.values)) for c in columns if _DEGREES.search(c.heading))
+    name = next((name for name, span in spans if span > _MOST_OF_A_TURN), None)
+    if name is None or not any(c.may_be_length and c.unit for c in columns):
+        return None
+    what = f"{name!r} goes round a circle, as in circular tests, and nothing says its points"
+    fix = "Give x_mm, y_mm and z_mm, from radius and angle (docs/reference/columns.md, circular_test)"
+    return NotReadError(what, where=grid.at(rows[0]), fix=fix)

@@ -52,15 +52,12 @@ def turned(grid: CutSheet) -> Sheet | None:
             texts[len(part.over)] = part.name if several or not any(above) else above[k]
             named = f"{names[0]} {{}}" if names else "({})"
             rows.append([named.format(text) if text.isdigit() else text for text in texts])
-        rows += [[_cell(sheet.rows[row], k) for row in (*part.over, *part.rows)] for k in part.columns]
+        own = [sheet.rows[row] for row in (*part.over, *part.rows)]
+        rows += [[cells[k] if k < len(cells) else "" for cells in own] for k in part.columns]
         # of a row further down, so that what stands above is a title, and no head
         lines += [sheet.lines[part.rows[1]]] * (len(rows) - len(lines))
         i = part.rows[-1] + 1
     return replace(sheet, rows=rows, lines=lines, spreadsheet=False) if found else None
-
-
-def _cell(cells: Sequence[Cell], k: int) -> Cell:
-    return cells[k] if k < len(cells) else ""
 
 
 def _part(grid: CutSheet, i: int) -> AcrossPart | None:
