@@ -55,7 +55,7 @@ def test_what_is_denied_or_exceeded_is_a_warning() -> None:
     texts = [str(text) for text in readings_warnings([StatementEvidence(*one) for one in said], large)]
     assert texts == [
         "The recording denies how these axes are stated to be read, so that nothing of it is used: X.",
-        "The recording denies the bound that is stated, so that it is not used: Periodic scale error of Z. It is 4.3e+03 "
+        "The recording denies the bound that is stated, so that it is not used: Periodic scale error of Z. It is 4300 "
         "times as probable without it.",
         "The recording shows more than is stated, and is followed: Play of axes that are stated, over what is stated 2.5 "
         "(2.5 to 2.5).",

@@ -70,8 +70,8 @@ def test_the_named_error_has_the_digits_that_its_uncertainty_supports(
 
 def test_a_parameter_is_named_by_its_effect_and_where_there_are_several_by_itself() -> None:
     effects: Any = [
-        SimpleNamespace(name="scale_x", title="Scale of X", reported=["ppm"]),
-        SimpleNamespace(name="bow_x", title="Bow of X", reported=["um", "place"]),
+        SimpleNamespace(name="scale_x", title="Scale of X", reported=["ppm"], coefficients=()),
+        SimpleNamespace(name="bow_x", title="Bow of X", reported=["um", "place"], coefficients=()),
     ]
     sizes = [SimpleNamespace(name="length_mm", title="Length of the bar"), SimpleNamespace(name="u", title="Other")]
     result: Any = SimpleNamespace(model=SimpleNamespace(effects=effects), artefact=SimpleNamespace(sizes=sizes))
@@ -136,7 +136,7 @@ def recorded(**columns: Any) -> Points:
         ({"U_um": "0.2 + 0.5·L/1000", "k": 2.0}, "U = 0.2 µm + 0.5·10⁻⁶·L, k = 2"),
         ({"U_um": "0,2 + L/2000", "k": 2.0}, "U = 0.2 µm + 0.5·10⁻⁶·L, k = 2"),
         ({"U_um": "Q[0.2; 0.5·L/1000]", "k": 2.0}, "U = Q[0.2 µm; 0.5·10⁻⁶·L], k = 2"),
-        ({"U_um": "L/2000", "k": 2.05}, "U = 0.5·10⁻⁶·L, k = 2.05"),
+        ({"U_um": "L/2000", "k": 2.05}, "U = 0.5·10⁻⁶·L, k = 2.05, taken as Student's t for 95 %"),
         ({"U_um": 0.4, "k": 2.25, "degrees_of_freedom": 10.0}, "U = 0.4 µm, k = 2.25, 10 degrees of freedom"),
         ({"U_um": 0.4, "degrees_of_freedom": 10.0}, "U = 0.4 µm, k = 2.23, 10 degrees of freedom"),
         ({"u_um": "0.1 + L/4000"}, "u = 0.1 µm + 0.25·10⁻⁶·L"),
