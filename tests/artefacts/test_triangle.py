@@ -260,6 +260,6 @@ def test_the_picture_says_which_parameter_is_out() -> None:
     """Tolerances of 12 ppm and 8″: scale Z is 14 ppm, squareness XY 12″; YZ with 7.5″ is too near to call."""
     verdicts = {row[0]: row[-1] for row in table(JOB, "Parameters and tolerances").rows}
     assert {name for name, said in verdicts.items() if said == "fail"} == {"Scale error of Z", "Squareness X–Y"}
-    assert verdicts["Squareness Y–Z"] == "open"
+    assert verdicts["Squareness Y–Z"] == "undecided"
     picture = next(b for b in blocks(JOB) if isinstance(b, Plot) and b.caption.startswith("Each parameter over its"))
     assert picture.alternative == "Out of tolerance: Scale error of Z and Squareness X–Y."

@@ -69,9 +69,12 @@ def test_the_named_error_has_the_digits_that_its_uncertainty_supports(
 
 
 def test_a_parameter_is_named_by_its_effect_and_where_there_are_several_by_itself() -> None:
+    def named(name: str) -> Any:
+        return SimpleNamespace(name=name, what="")
+
     effects: Any = [
-        SimpleNamespace(name="scale_x", title="Scale of X", reported=["ppm"], coefficients=()),
-        SimpleNamespace(name="bow_x", title="Bow of X", reported=["um", "place"], coefficients=()),
+        SimpleNamespace(name="scale_x", title="Scale of X", reported=[named("ppm")], coefficients=()),
+        SimpleNamespace(name="bow_x", title="Bow of X", reported=[named("um"), named("place")], coefficients=()),
     ]
     sizes = [SimpleNamespace(name="length_mm", title="Length of the bar"), SimpleNamespace(name="u", title="Other")]
     result: Any = SimpleNamespace(model=SimpleNamespace(effects=effects), artefact=SimpleNamespace(sizes=sizes))
