@@ -188,7 +188,10 @@ class CutSheet:
         if all(isinstance(row[k], str) and _RULE.fullmatch(row[k]) for k in filled):  # type: ignore[arg-type]
             return "rule"
         numbers = [k for k in filled if self.figures[i][k] is not None]
-        if not numbers or self.place(i):
+        around = [self.figures[j] for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
+        beside = [[k for k, f in enumerate(own) if f is not None] for own in around]
+        coordinates = len(numbers) in (1, 2, 3, 6)  # of one place or two
+        if not numbers or (self.place(i) and (coordinates or numbers not in beside)):
             return "text"
         counted = len(filled) == 2 and numbers == filled[1:] and (self.figures[i][filled[1]] or (0, 0))[1] >= 1
         if counted and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN):
@@ -201,8 +204,6 @@ class CutSheet:
             ):
                 return "text"
         texts = {k for k in filled if k not in numbers and unit_named(self.text(i, k)) is None}
-        around = [self.figures[j] for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
-        beside = [[k for k, f in enumerate(own) if f is not None] for own in around]
         told = len(numbers) > 1 and all(k - 1 in texts for k in numbers) and numbers not in beside
         return "text" if told else "figures"
 

@@ -330,6 +330,9 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
     for row in range(first, len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and row < last and row not in heads:
+            own = [grid.figure(row, k) for k in columns]
+            if None not in own and any(f is not None and f[1] < 1 for f in own):
+                return None  # whatever else stands in it, it may be measured
             text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
             if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
                 told.append(header.shown(grid.sheet, row, header.REMARK))

@@ -125,3 +125,18 @@ def test_runs_there_and_back_are_the_same_down_and_across() -> None:
     assert {name: values.tolist() for name, values in found.columns.items()} == {
         n: v.tolist() for n, v in turned.columns.items()
     }
+
+
+def test_a_row_whose_text_says_where_it_lies_is_measured_as_those_beside_it() -> None:
+    places = {"X": "axe X, Y=400 Z=300, départ X=100", "D1": "diagonale (100 / 100 / 50) vers (700 / 700 / 550)"}
+    rows = [
+        f"{line};{place};{nominal:.4f};{nominal + 3e-4:.4f};{nominal - 6e-4:.4f};{nominal + 1e-4:.4f}"
+        for line, place in places.items()
+        for nominal in (49.9998, 124.9999, 250.0002, 375.0003)
+    ]  # fmt: skip
+    head = ["Ligne;Emplacement;Longueur étalonnée;Mesure 1;Mesure 2;Mesure 3", ";;mm;mm;mm;mm"]
+    with pytest.raises(UnplacedError) as unplaced:
+        imported("\n".join([*head, *rows, ""]).encode(), "e0.csv", ImportKeys())
+    (found,) = unplaced.value.lengths
+    assert len(found.measured) == 3 * len(rows)
+    assert {*found.names} == {"X", "D1"}
