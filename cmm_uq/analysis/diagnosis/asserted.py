@@ -111,11 +111,11 @@ def _instead(
     names = [tuple(others[seen[k]] for k in each) for _, each, _ in tried]
     evidence = _evidence(comparison, given, [taken, *names])
     found: list[tuple[tuple[int, ...], tuple[float, ...], float, float]] = []
-    for (lost, _, sizes), members, log in zip(tried, names, evidence[1:], strict=True):
-        lost = max(lost - 0.5 * max(spare - len(members), 0), 0.0)
+    for (less, _, sizes), members, log in zip(tried, names, evidence[1:], strict=True):
+        lost = max(less - 0.5 * max(spare - len(members), 0), 0.0)  # without what so many more fit of noise alone
         if evidence[0] - log <= np.log(ODDS) or always >= set(members):
-            found.append((members, tuple(sizes.tolist()), lost, 2 * lost * variance / size**2))
-    return [one for one in found if not any(set(less[0]) < set(one[0]) for less in found)]
+            found.append((members, tuple(sizes.tolist()), lost, 2 * less * variance / size**2))
+    return [one for one in found if not any(set(fewer[0]) < set(one[0]) for fewer in found)]
 
 
 def _single(explanation: Explanation) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+import scipy
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.factors import (
@@ -32,7 +33,8 @@ from cmm_uq.jobs.importing.factors import (
 _SAME_PLACE_MM = 0.5
 _RIGID_MM = 0.1
 _EVEN_MM = 0.2  # to which the points of a plate are evenly spaced
-_COMPARED = 5000  # points of which the places are compared
+_COMPARED = 5000  # points of which all places are compared; of more those that come again equally often
+_CROWDED, _NEARLY = 20, 0.98  # points at one place, from which on they are a scan; part of the places
 _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
 # what speaks for a way, the strongest first
 _TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED, _AT_LEAST = 6.0, 5.0, 4.0, 3.0, 2.0, 1.0
@@ -53,6 +55,8 @@ class Grouping:
 
 def places(xyz: Floats) -> Ints:
     """Number of the place of each point (n, 3): those within half a millimetre of the first there are one."""
+    if len(xyz) > _COMPARED:
+        return _places_of_many(xyz)
     found = np.full(len(xyz), -1, dtype=np.int64)
     firsts, count = np.empty_like(xyz), 0
     for i, one in enumerate(xyz):
@@ -64,9 +68,22 @@ def places(xyz: Floats) -> Ints:
     return found
 
 
+def _places_of_many(xyz: Floats) -> Ints:
+    """The same of thousands; each is a place of its own unless nearly all come again, as often as another."""
+    tree, alone = scipy.spatial.KDTree(xyz), np.arange(len(xyz))
+    some = tree.query_ball_point(xyz[:: len(xyz) // 200], _SAME_PLACE_MM, p=np.inf, return_length=True)
+    if np.mean(some) > _CROWDED:
+        return alone
+    pairs = np.asarray(tree.query_pairs(_SAME_PLACE_MM, p=np.inf, output_type="ndarray"))
+    graph = scipy.sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(xyz), len(xyz)))
+    joined = np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1], dtype=np.int64)
+    often = np.bincount(np.bincount(joined))
+    return joined if often[2:].max(initial=0) > _NEARLY * often.sum() else alone
+
+
 def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]] | None:
     """Measurement, point and repeat of each of the places (n, 3), mm; ``None`` where nothing says which belong together."""
-    place = places(xyz) if len(xyz) <= _COMPARED else np.arange(len(xyz))
+    place = places(xyz)
     found = varying(labels, lengths=False)
     ways = [*filter(None, (_grouped(of, found, place, xyz) for of in _labels(found)))]
     plate = len(xyz) <= _COMPARED and _on_a_plate(xyz[np.unique(place, return_index=True)[1]])
@@ -99,7 +116,8 @@ def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
         both = together(one[1], other[1])
         if max(one[1].max(), other[1].max()) < both.max() < len(both) - 1:
             values = tuple(" ".join(pair) for pair in zip(one[0].values, other[0].values, strict=True))
-            yield Label("", values, "part"), both, LINE if LINE in (one[2], other[2]) else None
+            word = next((word for word in (POINT, LINE) if word in (one[2], other[2])), None)
+            yield Label("", values, "part"), both, word
 
 
 def _in_turn(xyz: Floats) -> Iterator[Counted]:
@@ -145,6 +163,9 @@ def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Flo
 
 def _rank(of: Counted, shape: str, *, named: bool, again: Counted | None) -> float:
     """How much speaks for a label of measurements: the shape of their points, words, names that begin again."""
+    letter = of[0].sort == "part" and all(len(one.rstrip("0123456789")) == 1 for one in of[0].values)
+    if letter and of[2] == POINT and shape == "moved":
+        return _NAMED  # P may be a position as well
     word = {LINE: 0.5, POINT: -0.5}.get(of[2] or "", 0.0)
     if shape == "same":
         return _RESTARTED if again and word > 0 and counted(of[0], lengths=True) == LINE else 0.0

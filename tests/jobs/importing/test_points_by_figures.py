@@ -137,3 +137,64 @@ def test_a_title_tells_two_artefacts_apart_at_one_place_where_what_was_repeated_
     found = imported("\n".join(lines).encode(), "a.csv", ImportKeys(unit="mm")).columns
     assert len(set(found["measurement"])) == count
     assert set(found["repeat"]) == set(range(1, 6 // count + 1))
+
+
+@pytest.mark.parametrize("names", ["POS{}_BALL{}_M{}", "BAR{}_S{}_R{}", "Lage{}_K{}_W{}"])
+@pytest.mark.parametrize(("bars", "parallel"), [(6, True), (6, False), (900, False)])
+def test_bars_are_bars_however_many_there_are_and_however_they_lie(names: str, bars: int, *, parallel: bool) -> None:
+    """The balls of parallel bars lie as two shifted artefacts would; names say that they do not."""
+    random = np.random.default_rng(9)
+    along = np.tile([0.6, 0.0, 0.8], (bars, 1)) if parallel else random.standard_normal((bars, 3))
+    first = random.uniform(0, 800, (bars, 3))
+    ends = np.stack([first, first + 400 * along / np.linalg.norm(along, axis=1)[:, None]], axis=1)
+    rows = ["name,x,y,z"]
+    for m in (1, 2, 3):
+        read = ends + random.normal(0, 0.002, ends.shape)
+        every = ((p, b) for p in range(bars) for b in (0, 1))
+        rows += [",".join([names.format(p + 1, b + 1, m), *(f"{v:.4f}" for v in read[p, b])]) for p, b in every]
+    found = imported("\n".join(rows).encode(), "a.csv", ImportKeys(unit="mm")).columns
+    assert [int(found[name].max()) for name in ("measurement", "point", "repeat")] == [bars, 2, 3]
+
+
+ARTEFACTS = {
+    "bar": [(0, 0, 0), (400, 0, 0)], "beam": [(x, 0, 0) for x in (0, 100, 200, 300, 400)],
+    "triangle": [(0, 0, 0), (300, 0, 0), (150, 260, 0)],
+    "plate": [(x, y, 0) for y in (0, 100, 200) for x in (0, 100, 200)],
+}  # fmt: skip
+NAMES = ("POS{}_BALL{}_M{}", "Lage {} Kugel {} Wdh {}", "P{}_S{}_R{}", "BB{}_{}_{}", "M{2}_P{0}_B{1}", "Q{}W{}Z{}")
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("repeats_outside", [False, True])
+@pytest.mark.parametrize("artefact", ARTEFACTS)
+def test_what_names_and_figures_leave_open_is_asked_and_never_read_otherwise(
+    artefact: str, *, repeats_outside: bool, turned: bool
+) -> None:
+    """Four places of an artefact, three times, by names of several kinds: shifted, a letter P may be a point or a position."""
+    random, read = np.random.default_rng(11), dict[str, bool]()
+    own = np.array(ARTEFACTS[artefact], dtype=float)
+    places = []
+    for k in range(4):
+        basis = np.linalg.qr(random.standard_normal((3, 3)))[0] if turned else np.eye(3)
+        places.append(own @ basis + np.array([80 * k + 50, 300 + 90 * k * (-1) ** k, 40 * k - 400]))
+    order = (
+        [(k, m) for m in range(3) for k in range(4)]
+        if repeats_outside
+        else [(k, m) for k in range(4) for m in range(3)]
+    )
+    rows = [(k, b, m, places[k][b] + random.normal(0, 0.002, 3)) for k, m in order for b in range(len(own))]
+    for pattern in NAMES:
+        text = ["name;x;y;z", *(
+            ";".join([pattern.format(k + 1, b + 1, m + 1), *(f"{v:.4f}" for v in xyz)]) for k, b, m, xyz in rows
+        )]  # fmt: skip
+        try:
+            found = imported("\n".join(text).encode(), "a.csv", ImportKeys(unit="mm")).columns
+        except CmmUqError:
+            continue
+        told = zip(*(found[name].tolist() for name in ("measurement", "point", "repeat")), strict=True)
+        one_to_one = {(one, (k, b, m)) for one, (k, b, m, _) in zip(told, rows, strict=True)}
+        placed = {(one[0], k) for one, (k, _, _) in one_to_one}
+        read[pattern] = len(one_to_one) == len(rows) and len(placed) == 4
+    assert all(read.values()), read
+    assert {NAMES[0], NAMES[1]} <= read.keys()
+    assert not turned or len(read) >= 5
