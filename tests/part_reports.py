@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.analysis.parts.budget import Way, spread
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
+from cmm_uq.analysis.parts.ways import Way, spread
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.base.messages import say

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.budget import point_errors, variance_shares, ways
+from cmm_uq.analysis.parts.budget import point_errors, variance_shares
 from cmm_uq.analysis.parts.result import conforming, evaluated, stated
 from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
+from cmm_uq.analysis.parts.ways import ways
 from cmm_uq.app.commands.parts.part import COVERAGE, decide_limits
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine

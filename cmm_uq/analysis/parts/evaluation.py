@@ -184,17 +184,19 @@ class Evaluator:
         rows = self.plan.rows[name]
         normals = self.plan.normals[rows]
         found = np.zeros((_count(coefficients), len(normals)), dtype=HEIGHTS)
-        pairs = zip(self.causes, coefficients, strict=True)
-        acting = [(one, np.asarray(drawn)) for one, drawn in pairs if one is not None and drawn is not None]
-        if common := [(one, drawn) for one, drawn in acting if isinstance(one, CommonCause)]:  # all in one product
-            key = name, tuple(id(one) for one, _ in common)
+        pairs = enumerate(zip(self.causes, coefficients, strict=True))
+        acting = [(k, one, np.asarray(drawn)) for k, (one, drawn) in pairs if one is not None and drawn is not None]
+        if common := [
+            (k, one, drawn) for k, one, drawn in acting if isinstance(one, CommonCause)
+        ]:  # all in one product
+            key = name, tuple(k for k, *_ in common)
             if key not in self._raising:
-                lefts, rights = zip(*(one.raising(rows, normals) for one, _ in common), strict=True)
+                lefts, rights = zip(*(one.raising(rows, normals) for _, one, _ in common), strict=True)
                 self._raising[key] = lefts, np.concatenate(rights)
             lefts, right = self._raising[key]
-            each = [drawn @ left for (_, drawn), left in zip(common, lefts, strict=True)]
+            each = [drawn @ left for (*_, drawn), left in zip(common, lefts, strict=True)]
             found = np.hstack(each).astype(HEIGHTS) @ right
-        for one, drawn in acting:
+        for _, one, drawn in acting:
             found += 0 if isinstance(one, CommonCause) else one.raised(drawn, rows, normals)
         return found
 

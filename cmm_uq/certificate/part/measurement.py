@@ -15,13 +15,14 @@ from cmm_uq import __version__
 from cmm_uq.analysis.conformity.decision import Outcome, rule_name, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
 from cmm_uq.analysis.machine.performance import PriorInfluence
-from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares, Way
+from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.methods import method as other_methods
 from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
+from cmm_uq.analysis.parts.ways import Way
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats

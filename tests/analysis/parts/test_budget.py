@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.machine.state import unmodelled_errors
-from cmm_uq.analysis.parts.budget import PLACE, mean_of_places, point_errors, variance_shares, ways
+from cmm_uq.analysis.parts.budget import PLACE, point_errors, variance_shares
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
-from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan, around
+from cmm_uq.analysis.parts.plan import PartCharacteristic, PartPose, Plan, Stylus, around
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual
+from cmm_uq.analysis.parts.ways import mean_of_places, ways
 from cmm_uq.base.errors import CmmUqError
 from tests.parts_drawn import POSE, block, circle, machine, plane, spot
 
@@ -165,6 +166,19 @@ def test_twice_the_points_halve_the_variance_of_noise() -> None:
     found = {str(way.name): way.u[0] for way in ways(*of(8), doubled=lambda: of(16))}
     assert found["as planned"] == pytest.approx(2 * 2e-3 / np.sqrt(8), rel=0.02)
     assert found["twice the points in every feature"] == pytest.approx(2 * 2e-3 / np.sqrt(16), rel=0.02)
+
+
+@pytest.mark.parametrize("count", [400, 4000])
+def test_what_reading_more_often_brings_does_not_depend_on_how_many_points_are_compared(count: int) -> None:
+    """A diameter: 0.5 µm of the tip, and as much of the mean of all points, which is half of it read four times."""
+    styli = (Stylus("stylus", u_diameter_um=0.5),)
+    plan = Plan((circle("c", [0, 0, 0], 20.0, count),), (PartCharacteristic("d", "size", ("c",)),), styli=styli)
+    given = MeasurementConditions(machine(noise_um=0.25 * np.sqrt(count)), (POSE,))
+    found = {str(way.name): way for way in ways(plan, given)}
+    assert found["as planned"].u[0] * 1e3 == pytest.approx(np.sqrt(0.25 + 0.25), rel=0.02)
+    assert found["each point four times"].u[0] * 1e3 == pytest.approx(np.sqrt(0.25 + 0.0625), rel=0.02)
+    assert found["styli qualified twice as well"].u[0] * 1e3 == pytest.approx(np.sqrt(0.0625 + 0.25), rel=0.02)
+    assert (found["as planned"].known(inferred=False) > 0.04) == (count > 2000)
 
 
 def test_operators_scatter_by_what_is_stated_and_anew_in_each_set_up() -> None:

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.conformity.decision import PriorKnowledge
 from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
 from cmm_uq.analysis.parts import setup
-from cmm_uq.analysis.parts.budget import DRAWS as SHARED, point_errors, variance_shares, ways
+from cmm_uq.analysis.parts.budget import DRAWS as SHARED, point_errors, variance_shares
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.methods.of_job import compare_methods, methods_of
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.result import conforming, middle, stated, within_bounds
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual, prior_influence
+from cmm_uq.analysis.parts.ways import ways
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
 from cmm_uq.app.commands.parts.drift import further_of
 from cmm_uq.app.commands.parts.machine import state_machine, with_calibration, with_history
