@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from math import hypot, isfinite
+from math import hypot, isfinite, sqrt
 from typing import Literal
 
 import numpy as np
@@ -31,8 +31,17 @@ class PriorKnowledge:
 
     def after(self, value: float, u: float) -> PriorKnowledge:
         """The same after a measurement of it: precisions add (JCGM 106:2012, formula (A.9))."""
-        weight = self.sd**2 / (self.sd**2 + u**2)
+        weight = 1.0 - self.share(u)
         return PriorKnowledge(self.mean + weight * (value - self.mean), u * float(np.sqrt(weight)))
+
+    def share(self, u: float) -> float:
+        """How much of the posterior mean is the prior's, the rest being the measurement's."""
+        return u**2 / (self.sd**2 + u**2)
+
+    def least_favourable(self, value: float, u: float, limit: float) -> float:
+        """Of all u up to this one that by which least lies below ``limit``, where ``value`` does: the derivative's zero."""
+        turn = 2 * value - self.mean - limit
+        return min(u, self.sd * sqrt(max(limit - value, 1e-12 * abs(limit)) / turn)) if turn > 0 else u
 
     def within(self, limit: float, *, signed: bool) -> float:
         high = float(scipy.special.ndtr((limit - self.mean) / self.sd))
@@ -94,6 +103,10 @@ Outcome = Literal["pass", "conditional pass", "undecided", "conditional fail", "
 CONFORMANCE_PROBABILITY = 0.95  # Default of ISO 14253-1:2017, 5.2: conformity or nonconformity is proved with 95 %
 COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty that a guard band is a multiple of (ILAC-G8:09/2019, 4.2.2)
 RATIO = 4.0  # Zone of the specification over the uncertainty interval, where ASME B89.7.3.1 is named without another
+NOT_BY_PRIOR_ALONE = say(
+    "By prior knowledge alone nothing is accepted: no value that a smaller uncertainty would not let pass, and none where the "
+    "measurement by itself could prove none."
+)
 UNCONDITIONAL = 0.02  # Largest share of wrongly accepted items (ANSI/NCSL Z540.3-2006, 5.3 b)
 
 
@@ -178,21 +191,34 @@ def _decided(
 def _decided_knowing(
     value: float, u: float, limit: float, rule: Rule, signed: bool, prior: PriorKnowledge, unstated: float
 ) -> tuple[Outcome, float | None]:
-    """The same with a prior, of which rules that need none take no account."""
-    size = abs(value) if signed else value
-    if (share := largest_share(rule)) is not None:
-        accepted = acceptance_limit(share, limit, u, prior, signed=signed)
-        if accepted is not None and size <= accepted:
-            return "pass", limit - accepted
-        return "fail" if size > limit else "undecided", None if accepted is None else limit - accepted
-    if (least := least_probability(rule)) is None:
+    """The same with a prior, of which rules that need none take no account.
+
+    What it makes likely is no pass by a measurement of which alone no value would be one, nor by an u that is larger than one
+    by which the value would not be accepted.
+    """
+    size, sides = abs(value) if signed else value, (1.0, -1.0) if signed and prior.mean else (1.0,)
+    share, least = largest_share(rule), least_probability(rule)
+    risk = share if least is None else 1 - least
+    if risk is None:
         return _decided(size, u, limit, rule, signed, _beyond(size, u, limit, signed), unstated)
-    both = [prior.after(side * value, u) for side in ((1, -1) if signed and prior.mean else (1,))]
-    within = min(known.within(limit, signed=signed) for known in both)
-    beyond = max(known.beyond(limit, signed=signed) for known in both)
-    outcome = _by_probability(size, limit, within, beyond, 1 - least)
-    side = -1.0 if signed and value < 0 else 1.0
-    return outcome, _posterior_band(u, limit, 1 - least, signed, prior, side)
+    alone = _guard_band(u, limit, risk, signed)
+    proves = alone is not None and alone <= limit
+    if least is None:
+        accepted = acceptance_limit(risk, limit, u, prior, signed=signed) if proves else None
+        outside = True
+    else:
+        either = [PriorKnowledge(side * prior.mean, prior.sd) for side in sides]
+
+        def excess(size: float) -> float:
+            known = [each.after(size, each.least_favourable(size, u, limit)) for each in either]
+            return max(each.beyond(limit, signed=signed) for each in known) - risk
+
+        accepted = root(excess, 0.0, limit, 1e-12 * limit) if proves and excess(0.0) <= 0 else None
+        outside = min(each.after(size, u).within(limit, signed=signed) for each in either) <= risk
+    band = None if accepted is None else limit - accepted
+    if size > limit:
+        return "fail" if outside else "undecided", band
+    return "pass" if accepted is not None and size <= accepted else "undecided", band
 
 
 def _figure(rule: Rule, of: type, name: str, usual: float) -> float | None:
@@ -258,17 +284,6 @@ def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | No
     if _beyond(0.0, u, limit, signed) > risk:
         return None
     return limit - root(lambda v: _beyond(v, u, limit, signed) - risk, 0.0, limit, 1e-12 * limit)
-
-
-def _posterior_band(
-    u: float, limit: float, risk: float, signed: bool, prior: PriorKnowledge, side: float
-) -> float | None:
-    def excess(size: float) -> float:
-        return prior.after(side * size, u).beyond(limit, signed=signed) - risk
-
-    if excess(limit) <= 0:
-        return 0.0
-    return None if excess(0.0) > 0 else limit - root(excess, 0.0, limit, 1e-12 * limit)
 
 
 @lru_cache(maxsize=1024)  # the lengths of a test have one rule, and mostly one guard band

@@ -40,6 +40,7 @@ class LimitDecision:
     # none, or where a zone was measured so much better than its errors that even this value proves nothing
     accepted: Ends | None
     rule: Text
+    share_of_prior: float | None = None  # of its weight in what is known of the value; None without a prior
 
     @property
     def not_passing(self) -> LimitDecision:
@@ -135,6 +136,16 @@ class Limits:
         outside = (true > self.high) | (true < self.low)
         return float(weight[~outside].sum()) / total, float(weight[outside].sum()) / total
 
+    def doubt(self, value: float) -> float:
+        """Probability of the true value outside with what the prior says, by the least favourable of errors up to these."""
+        if self.prior is None or not self.inside(value):
+            return self.knowing(value)[1]
+        known, up = self.prior, value - self.high >= self.low - value
+        side, limit = (1.0, self.high) if up else (-1.0, -self.low)
+        least = replace(known, mean=side * known.mean).least_favourable(side * value, self.u, limit)
+        narrower = self if least >= self.u else replace(self, errors=self.errors * (least / self.u))
+        return narrower.knowing(value)[1]
+
     def wrongly_accepted(self, guard: float) -> float:
         """Share of all items that lie outside and are accepted, with acceptance so far inside the limits."""
         prior = self.prior
@@ -160,7 +171,8 @@ def judge(limits: Limits, rule: Rule, value: float | None) -> LimitDecision:
     if limits.zone:
         accepted = _accepted_near_zero(limits, rule, value, accepted)
     outcome = outcome_of(limits, rule, value, accepted)
-    return LimitDecision(limits.lower, limits.upper, outcome, *limits.knowing(value), accepted, words)
+    share = None if limits.prior is None else limits.prior.share(limits.u)
+    return LimitDecision(limits.lower, limits.upper, outcome, *limits.knowing(value), accepted, words, share)
 
 
 def outcome_of(limits: Limits, rule: Rule, value: float, accepted: Ends | None) -> Outcome:
@@ -188,7 +200,7 @@ def _safe(limits: Limits, rule: Rule, value: float) -> bool:
     if not limits.zone:
         return True
     if (least := decision.least_probability(rule)) is not None:
-        return limits.knowing(value)[1] <= 1 - least
+        return limits.doubt(value) <= 1 - least
     if (risk := decision.largest_risk(rule)) is None and (guard := guard_width(rule)):
         risk = float(special.ndtr(-guard * COVERAGE_FACTOR))
     return risk is None or limits.beyond(value) <= risk
@@ -220,9 +232,13 @@ def accepted_by(limits: Limits, rule: Rule) -> Ends | None:
         return (limits.lower, limits.upper) if _wide(limits, rule) else None
     if (risk := decision.largest_risk(rule)) is not None:
         return _where(limits, lambda value: limits.beyond(value) <= risk)
-    if (least := decision.least_probability(rule)) is not None:
-        return _where(limits, lambda value: limits.knowing(value)[1] <= 1 - least)
-    if (share := decision.largest_share(rule)) is not None:
+    share, least = decision.largest_share(rule), decision.least_probability(rule)
+    alone = share if least is None else 1 - least
+    if alone is not None and _where(limits, lambda value: limits.beyond(value) <= alone) is None:
+        return None  # what makes it likely is the prior, whatever was measured
+    if least is not None:
+        return _where(limits, lambda value: limits.doubt(value) <= 1 - least)
+    if share is not None:
         return _inwards(limits, _smallest_guard(limits, share))
     return _inwards(limits, guard_width(rule) * COVERAGE_FACTOR * limits.u)
 

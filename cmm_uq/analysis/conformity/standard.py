@@ -21,7 +21,7 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty, needed
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty, needed, needs_prior
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import Quantity
@@ -292,8 +292,14 @@ class Test:
     def _of_the_rule(self, items: Sequence[Decided], worst: Decided) -> list[Text]:
         """What the rule leaves out, what the standard always says, and whether the capability stood for a smaller u."""
         more: list[Text] = [NOT_CONSIDERED] if self.facts.rule == "simple" and worst.u_um > 0 else []
-        if self.facts.prior is None and worst.u_um > 0:
+        if (prior := self.prior(worst.limit_um)) is None and worst.u_um > 0:
             more.append(BY_MEASUREMENT_ALONE)
+        elif prior is not None and worst.u_um > 0:
+            share = 100 * prior.share(worst.u_um)
+            more.append(
+                say("Prior knowledge of such machines has {share:.1f} % of the weight in the probability.", share=share)
+            )
+            more += [rules.NOT_BY_PRIOR_ALONE] if needs_prior(self.facts.rule) else []
         more += self.standard.remarks
         least = self.least_u(np.array([self._length(item.length_mm) for item in items]))
         if any(0 < item.u_um <= floor * (1 + 1e-9) for item, floor in zip(items, least, strict=True)):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.decision import Outcome
+from cmm_uq.analysis.conformity.decision import NOT_BY_PRIOR_ALONE, Outcome
 from cmm_uq.analysis.parts.budget import ASSOCIATIONS, KINDS
 from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.analysis.parts.plan import Plan
@@ -24,6 +24,7 @@ from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
 from cmm_uq.certificate.part.plots import Margin, correlation_section, margin_plots
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
+from cmm_uq.jobs.tables.conformity import needs_prior
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import nominal
@@ -227,6 +228,7 @@ def conformity_section(found: PartMeasurement) -> Section:
     return section(
         say("Conformity with the drawing"),
         Paragraph(_rule(found, limited)),
+        Paragraph(NOT_BY_PRIOR_ALONE) if needs_prior(found.job.facts.decision.rule) else None,
         *margin_plots([_margin(one) for one in limited if measured or one.width > 0]),
         *(_decisions(part, nominal, measured=measured) for part in _parts(limited)),
     )
@@ -249,9 +251,16 @@ def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float],
         Column(say("Upper limit"), value), Column(say("Accepted"), value, numeric=False),
         *((say("Decision"), say("P")) if measured else ()),
     )  # fmt: skip
+    shares = [
+        one.judged.share_of_prior for one in every if one.judged is not None and one.judged.share_of_prior is not None
+    ]
     notes = holding(
         (True, say("Accepted: values that the rule accepts with this uncertainty.")),
-        (measured, say("P: probability that the true value is within its limits, by the virtual measurements.")),
+        (measured and not shares,
+         say("P: probability that the true value is within its limits, by the virtual measurements.")),
+        (bool(shares), say(
+            "P: probability that the true value is within its limits, by the virtual measurements and prior knowledge of such "
+            "parts, which has up to {share:.1f} % of the weight.", share=100 * max(shares, default=0.0))),
         (any(one.judged is not None and one.judged.accepted is None for one in every),
          say("None: the uncertainty is too large for any value to be accepted.")),
     )  # fmt: skip

@@ -313,7 +313,7 @@ def _decision(each: Mapping[str, Any], rule: Rule, *, known: bool, withheld: boo
     if risk is not None and _limits(each, u).inside(value):
         inner = zip(ends or (), (1, -1), strict=False)
         taken = ends is not None and all(end is None or side * (value - end) >= 0 for end, side in inner)
-        if taken != (beyond <= risk) and not tenth_digit_decides:
+        if (taken > (beyond <= risk) if known else taken != (beyond <= risk)) and not tenth_digit_decides:
             yield "limits.accepted", "does not follow from the probability and the rule", accepted, f"{beyond:.4g}"
     if not known and not is_zone(each) and u > 0:
         yield from _bounded(limits, value, u * (1 + DRAWN), inside, beyond)

@@ -85,6 +85,26 @@ def test_with_a_prior_too(rule: Rule, zone: bool) -> None:
     assert accepted[1] == pytest.approx(0.1 - band, abs=2e-4 if zone and rule in ("Z540.3", BY_PRIOR[3]) else 1e-4)
 
 
+@pytest.mark.parametrize("rule", ["JCGM 106", "Z540.3"])
+@pytest.mark.parametrize("zone", [False, True])
+@pytest.mark.parametrize("times", [3.0, 4.2, 7.0, 100.0])
+def test_a_larger_uncertainty_accepts_no_more_and_at_last_nothing(rule: Rule, zone: bool, times: float) -> None:
+    """As :func:`decide` has it; 7 times U is more than 0.1/1.645, by which alone no value is proved."""
+    prior = PriorKnowledge(0.0, 0.04)
+    errors = times * NORMAL
+    limits = Limits(None, 0.1, errors, zone, prior) if zone else Limits(-0.1, 0.1, errors, zone, prior)
+    band = decide(0.0, times * U, 0.1, rule, signed=not zone, prior=prior).guard_band
+    accepted = judge(limits, rule, 0.095).accepted
+    if times > 6:
+        assert (band, accepted) == (None, None)
+        assert judge(limits, rule, 0.0).outcome == "undecided"
+        return
+    assert band is not None
+    assert accepted is not None
+    assert accepted[1] == pytest.approx(0.1 - band, abs=1e-3)
+    assert judge(limits, rule, 0.095).outcome == ("undecided" if rule == "JCGM 106" else "pass")
+
+
 def test_a_limit_on_the_lower_side_mirrors_one_on_the_upper() -> None:
     skew = np.sort(np.random.default_rng(1).gamma(2.0, U, 50_000))
     skew = skew - skew.mean()

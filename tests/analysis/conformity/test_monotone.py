@@ -10,9 +10,9 @@ from dataclasses import replace
 import pytest
 from hypothesis import HealthCheck, Phase, assume, example, given, settings, strategies as st
 
-from cmm_uq.analysis.conformity.decision import Outcome, decide
+from cmm_uq.analysis.conformity.decision import Outcome, PriorKnowledge, decide
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, Rule, UncertaintyRatio
+from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, PosteriorProbability, Rule, UncertaintyRatio
 from tests.analysis.conformity.by_hand.deciding import decided
 from tests.analysis.conformity.by_hand.tables import Case, Right, job_of
 
@@ -263,9 +263,46 @@ def test_one_value_with_a_larger_uncertainty_is_never_accepted_where_it_was_not(
     assert rule != "ISO 14253-1" or after != "fail" or before == "fail"
 
 
-def test_with_a_prior_a_larger_uncertainty_may_accept() -> None:
+@given(
+    rule=st.sampled_from(["JCGM 106", "Z540.3", PosteriorProbability(posterior_probability=0.8)]),
+    value=st.floats(-12, 12),
+    u=st.floats(0.01, 20),
+    times=st.floats(1, 100),
+    sd=st.floats(0.5, 30),
+    mean=st.sampled_from([0.0, 0.0, 3.0, -3.0]),
+    signed=st.booleans(),
+)
+@example(rule="JCGM 106", value=9.5, u=1.0, times=5.0, sd=4.0, mean=0.0, signed=True)
+@example(rule="Z540.3", value=9.9, u=1.0, times=100.0, sd=4.0, mean=0.0, signed=True)
+@MANY
+def test_with_a_prior_a_larger_uncertainty_accepts_nothing_either(
+    rule: Rule, value: float, u: float, times: float, sd: float, mean: float, signed: bool
+) -> None:
+    assume(signed or value >= 0)
+    prior = PriorKnowledge(mean, sd)
+    before, after = (decide(value, each, 10.0, rule, signed=signed, prior=prior) for each in (u, times * u))
+    assert after.outcome != "pass" or before.outcome == "pass"
+    assert after.guard_band is None or (before.guard_band is not None and after.guard_band >= before.guard_band - 1e-3)
+
+
+@pytest.mark.parametrize("signed", [True, False])
+@pytest.mark.parametrize(("rule", "largest"), [("JCGM 106", (5.1, 6.07)), ("Z540.3", (4.29, 4.86))])
+def test_a_prior_alone_accepts_nothing(rule: Rule, largest: tuple[float, float], signed: bool) -> None:
+    """Of errors of 0 ± 1 nearly all conform to 10; a measurement that alone could prove no value adds nothing to that.
+
+    Half a normal distribution's 95 % interval fits between ± 10 up to u = 10/1.96, its upper 95 % limit below 10 up to
+    10/1.645; with 2 % it is 10/2.326 and 10/2.054.
+    """
+    most, prior = largest[0 if signed else 1], PriorKnowledge(0.0, 1.0)
+    assert decide(0.0, most, 10.0, rule, signed=signed, prior=prior).outcome == "pass"
+    for u in (1.01 * most, 1e6):
+        found = decide(0.0, u, 10.0, rule, signed=signed, prior=prior)
+        assert (found.outcome, found.guard_band) == ("undecided", None)
+
+
+def test_a_test_that_is_known_worse_is_not_accepted_by_its_prior() -> None:
     """4.95 of 5 among errors of 0 ± 1: known to 0.2 it is 4.76 ± 0.2, which reaches 5.08; known to 1 it is 2.475 ± 0.71."""
     job = 'conformity.rule = "JCGM 106"; conformity.prior = { sd_um = 1.0 }'
     known = Case("", ("step gauge, seven lines", "lengths"), "4.95 at 1/300", job, Right("", ()), (), "")
     assert outcome(known)[1] == "undecided"
-    assert outcome(replace(known, job=f"{job}; artefact.u_um = 1.0"))[1] == "pass"
+    assert outcome(replace(known, job=f"{job}; artefact.u_um = 1.0"))[1] == "undecided"
