@@ -22,9 +22,9 @@ from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
-from cmm_uq.laboratory.records.facts import KEY, Heads
+from cmm_uq.laboratory.records.facts import BEGINNING, KEY, ChainHead, Heads
 from cmm_uq.laboratory.records.opening import open_records
-from cmm_uq.laboratory.records.place import NONE, is_url, of_folder, place_of
+from cmm_uq.laboratory.records.place import NONE, is_url, of_folder, place_of, shown
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.stated import physics_of, with_own_physics
@@ -59,6 +59,22 @@ def ledger_of(
     with physics_of(job):
         content = content_of(records.home, files[results], job, command, folder, hashes)
     return records.ledger(kind_of_entry(content), content)
+
+
+class LateLedger:
+    """A ledger of records that are opened, or begun, when its set is put in place: a signal before leaves no empty ones."""
+
+    def __init__(self, begun: Callable[[], Ledger]) -> None:
+        self._begun = cache(begun)
+
+    def intend(self, token: str, folder: Path, manifest: str) -> None:
+        self._begun().intend(token, folder, manifest)
+
+    def commit(self, token: str) -> None:
+        self._begun().commit(token)
+
+    def forget(self, token: str) -> None:
+        self._begun().forget(token)
 
 
 def content_of(
@@ -159,8 +175,9 @@ class Form:
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            history = known or made.enter_context(opened(where, out))  # nothing is made of what is refused
-            heads = NOT_RECORDED if history is None else history.heads(self.command, owner.job)
+            at = place_of(where, of_folder(out))
+            empty = NOT_RECORDED if at is None else Heads(ChainHead(0, BEGINNING, None))
+            heads = empty if known is None else known.heads(self.command, owner.job)
             language = job.facts.job.language
             finished: Finished = unchanged
             if signing is not None:
@@ -168,11 +185,15 @@ class Form:
                 finished = signing.finished(laboratory, language=language, said=lambda text: said_in(text, language))
             contents = self.contents(found, stage, finished=finished, heads=heads)
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
-            ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
-            files = place.write(contents, ledger=ledger)
+
+            def begun() -> Ledger:
+                history = known or made.enter_context(open_records(at, create=True))
+                return ledger_of(history, job, self.command, folder, contents, RESULTS)
+
+            files = place.write(contents, ledger=None if at is None else LateLedger(begun))
             by_name = "; the machine has no [machine] serial and is known by its name"
             how = "" if job.facts.machine.serial else by_name
-            recorded = "" if history is None else f"Recorded in {history.shown}{how}."
+            recorded = "" if at is None else f"Recorded in {shown(at)}{how}."
         stage("Done", 1.0)
         ends = (found.summary, found.conforming, job.facts.job.id, job.origin, recorded)
         return Written(found, contents[RESULTS], files, *ends)

@@ -34,9 +34,9 @@ class Unplaced(Protocol):
 Held = TypeVar("Held")
 _placing = threading.Lock()
 _stages: list[Unplaced] = []
-_written: list[Path] = []
-_going_in: list[Path] = []
-_inside: list[tuple[Path, Unplaced | None]] = []
+_written: list[Path | str] = []
+_going_in: list[Path | str] = []
+_inside: list[tuple[Path | str, Unplaced | None]] = []
 _changing: list[int] = []
 _signalled: list[int] = []
 _speaking: list[Callable[[], None]] = []
@@ -74,26 +74,26 @@ def changing() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def placing(folder: Path, staged: Unplaced | None = None) -> Iterator[None]:
+def placing(where: Path | str, staged: Unplaced | None = None) -> Iterator[None]:
     """While files are put in place, a signal waits; afterwards it says that they were written."""
     give_way()  # of a thread that is not the one that a signal stops
-    _going_in.append(folder)  # before the lock: a signal in between must not stop whoever holds it
+    _going_in.append(where)  # before the lock: a signal in between must not stop whoever holds it
     try:
         _placing.acquire()
         while _signalled:  # a signal came while others had the lock: it is not for who waited
             _placing.release()
             give_way()
             _placing.acquire()
-        _inside.append((folder, staged))
+        _inside.append((where, staged))
         try:
             yield
             if not _keeping:  # or there may be a hundred thousand of them, and what is kept is said
-                _written.append(folder)
+                _written.append(where)
         finally:
             _inside.clear()
             _placing.release()
     finally:
-        _going_in.remove(folder)
+        _going_in.remove(where)
 
 
 def speaking(hush: Callable[[], None]) -> AbstractContextManager[None]:
@@ -106,8 +106,8 @@ def keeping(what: Callable[[], str]) -> AbstractContextManager[None]:
     return _held(_keeping, what)
 
 
-def written() -> tuple[Path, ...]:
-    """Folders whose files this process has put in place."""
+def written() -> tuple[Path | str, ...]:
+    """Folders whose files this process has put in place, and records to which it added."""
     return tuple(_written)
 
 
@@ -182,6 +182,6 @@ def _removed() -> str:
     if _written:
         return f"; what was asked for is written in {', '.join(map(str, _written))}"
     if inside:
-        where = ", ".join(str(folder) for folder, _ in inside)
+        where = ", ".join(str(place) for place, _ in inside)
         return f" while files were put in place; the next command in {where} completes it or takes it back"
     return f"; {_keeping[-1]() if _keeping else 'nothing was written'}"

@@ -134,16 +134,16 @@ class Stage:
                     for folder in [*Path(name).parents][-2::-1]:  # none above: a stage that was removed stays so
                         (self.stage / NEW / folder).mkdir(exist_ok=True)
                     _write(self.stage / NEW / name, content)
-            if ledger is not None:
-                ledger.intend(self.token, self.folder.absolute(), sha256(whole[MANIFEST]).hexdigest())
-            try:
-                with interruption.placing(self.folder, self):
+            with interruption.placing(self.folder, self):
+                if ledger is not None:
+                    ledger.intend(self.token, self.folder.absolute(), sha256(whole[MANIFEST]).hexdigest())
+                try:
                     self._commit(hashes, ledger)
-            except BaseException:
-                # a set that could neither be put in place nor be taken back is left to the next command in the folder
-                if ledger is not None and _token(self.folder / PLACING) != self.token:
-                    ledger.forget(self.token)
-                raise
+                except BaseException:
+                    # a set that could neither be put in place nor be taken back is left to the next command in the folder
+                    if ledger is not None and _token(self.folder / PLACING) != self.token:
+                        ledger.forget(self.token)
+                    raise
         self.made.clear()
         return {name: self.folder / name for name in (*hashes, MANIFEST)}
 

@@ -131,20 +131,22 @@ def test_a_file_where_the_folder_should_be_is_refused(iota: Path, tmp_path: Path
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interruption_leaves_no_half_report(iota: Path, tmp_path: Path, number: signal.Signals) -> None:
-    out = tmp_path / "out"
+    out, records = tmp_path / "out", tmp_path / "records.db"
     with subprocess.Popen(
-        [*COMMAND, "report", str(iota), "--out", str(out), "--verbose"], stderr=subprocess.PIPE, text=True
+        [*COMMAND, "report", str(iota), "--out", str(out), "--records", str(records), "--verbose"],
+        stderr=subprocess.PIPE,
+        text=True,
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:
-            if "Composing" in line:
+            if "Rendering" in line:
                 break
         process.send_signal(number)
         rest = process.stderr.read()
     assert process.returncode == 128 + number
     assert "nothing was written" in rest
     assert "Traceback" not in rest
-    assert not out.exists()
+    assert list(tmp_path.iterdir()) == []  # no records without an entry either
 
 
 def test_a_wrong_option_is_answered_with_exit_code_2(iota: Path) -> None:

@@ -18,6 +18,7 @@ from cmm_uq.app.commands.certificates.release import release, withdraw
 from cmm_uq.app.commands.laboratory.records import import_reports, inputs_of, remove_retained, retention
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.output import interruption
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import Records
 from tests.conftest import ROOT
@@ -166,6 +167,7 @@ def test_reports_of_before_are_imported_once_as_they_would_have_been_recorded(
     with open_records(tmp_path / "archive" / "records.db", create=True) as imported:
         done = import_reports(imported, [tmp_path / "archive"])
         assert [path.name for path in done.added] == ["iota"]
+        assert imported.shown in interruption.written()  # a signal from now on says so
         assert import_reports(imported, [tmp_path / "archive"]).known == done.added
         assert next(imported.entries()).data | {"folder": ""} == next(records.entries()).data | {"folder": ""}
         assert imported.certificates()[0].folder == str(tmp_path / "archive" / "2004" / "iota")

@@ -131,10 +131,10 @@ class BatchRun:
         listed: list[batch_jobs.BatchJob],
         options: BatchOptions,
         batch: Batch,
-        records: Records | None,
         tell: Stage,
     ) -> None:
-        self.listed, self.options, self.batch, self.records = listed, options, batch, records
+        self.listed, self.options, self.batch = listed, options, batch
+        self.records: Records | None = None
         self.there = bytearray(len(listed))
         self._under_way: dict[int, Job] = {}
         self._writing: dict[Future[dict[str, Any]], int] = {}
@@ -287,14 +287,13 @@ def write_batch(
     stage("Looking for jobs", 0.0)
     listed, planned = batch_jobs.jobs_in(folders, place)
     batch = Batch(place, len(listed), planned)
-    with opened(records, None if out is None else out / "job") as history:
-        run = BatchRun(listed, options, batch, history, stage)
-        batch.records = "" if history is None else history.shown
-        with interruption.keeping(run.kept):
-            run.through()
-            if parquet is not None:
-                stage("Writing the table", 1.0)
-                written = filter(None, map(batch_jobs.results_of, run.folders()))
-                batch_jobs.write_table(parquet, written, force=options.force)
-                batch.parquet = parquet
+    run = BatchRun(listed, options, batch, stage)
+    with interruption.keeping(run.kept), opened(records, None if out is None else out / "job") as run.records:
+        batch.records = "" if run.records is None else run.records.shown
+        run.through()
+        if parquet is not None:
+            stage("Writing the table", 1.0)
+            written = filter(None, map(batch_jobs.results_of, run.folders()))
+            batch_jobs.write_table(parquet, written, force=options.force)
+            batch.parquet = parquet
     return batch

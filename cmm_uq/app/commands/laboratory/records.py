@@ -15,7 +15,7 @@ from cmm_uq.app.commands.files import content_of
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of as whole_file
-from cmm_uq.base.output import MANIFEST, finish_interrupted, read_manifest, sha256_of
+from cmm_uq.base.output import MANIFEST, finish_interrupted, interruption, read_manifest, sha256_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import RESULTS
 from cmm_uq.laboratory.records import open_records
@@ -63,9 +63,10 @@ def import_reports(records: Records | Path, folders: Iterable[Path]) -> Imported
     ordered = sorted(contents.values(), key=lambda one: (one[1]["day"], one[1]["job"], one[1]["command"]))
     if ordered:
         with (
+            interruption.placing(records if isinstance(records, Path) else records.shown),
             open_records(records, create=True)
             if isinstance(records, Path)
-            else contextlib.nullcontext(records) as history
+            else contextlib.nullcontext(records) as history,
         ):
             history.append_all(("imported", content, None) for _, content in ordered)
     return ImportedReports(tuple(path for path, _ in ordered), tuple(known), tuple(refused), tuple(bare))

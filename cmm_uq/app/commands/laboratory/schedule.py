@@ -200,9 +200,16 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
     place = place_of(asked.records or found.records, beside(reports / "x"))
     log = Log(reports / facts.log.file if facts.log.file else None, facts.log.largest_bytes, facts.log.kept)
     ways = found.channels()
+    run: ScheduledRun | None = None
+
+    def kept() -> str:
+        count = 0 if run is None else run.counted.get(REPORTED, 0)
+        many = say("{count} reports were written", count=count)
+        return str(plural(count, one=say("1 report was written"), many=many))
+
     try:
         make = not asked.dry
-        with opened(place or NONE, None, make=make, create=make, read_only=asked.dry) as records:
+        with keeping(kept), opened(place or NONE, None, make=make, create=make, read_only=asked.dry) as records:
             if make:
                 with contextlib.nullcontext() if records is None else records.writing():
                     Problems(reports).mended(_RUN)
@@ -220,14 +227,7 @@ def run_scheduled(asked: ScheduledOptions, tell: Tell = lambda told: None, clock
             roots = [folder.absolute() for folder in asked.folders]
             due = partial(due_notices, records, within=within)
             run = ScheduledRun(roots, facts.run, work, outbox, due, tell, log.write, clock, asked.dry, asked.strict)
-
-            def kept() -> str:
-                count = run.counted.get(REPORTED, 0)
-                many = say("{count} reports were written", count=count)
-                return str(plural(count, one=say("1 report was written"), many=many))
-
-            with keeping(kept):
-                return run.through()
+            return run.through()
     except CmmUqError as error:  # of the records: without them nothing is made, and somebody has to hear of that too
         if not asked.dry:
             since = Problems(reports).since(_RUN, str(error), clock.moment())
