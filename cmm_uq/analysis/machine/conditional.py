@@ -25,7 +25,7 @@ from cmm_uq.analysis.machine import recordings
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.machine.model.field import GivenPeriod, covariance, family_of, linear
+from cmm_uq.machine.model.field import AtPoints, GivenPeriod, covariance, family_of, linear
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths
 from cmm_uq.machine.physics.effect import Effect
@@ -45,23 +45,10 @@ from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import Cause, Doubt, sample_with_noise
 
 
-class PointwiseEffect(Effect):
-    """One millimetre of an error along the motion of an axis at each point by itself."""
-
-    def __init__(self, effect: Effect) -> None:
-        self.name, self.along_motion = effect.name, effect.along_motion
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        found = np.zeros((len(points), 3, len(points)))
-        each = np.arange(len(points))
-        found[each, "xyz".index(str(self.along_motion)), each] = 1.0
-        return found
-
-
 def shown(model: RecordingModel, effect: Effect) -> Floats:
-    """(m, n) of the model's used observations, of a millimetre of error at each of its points."""
+    """(m, n) of the model's used observations, of a millimetre of an axis' error at each of its points by itself."""
     about = model.estimate().about
-    return model.seen(model.columns(PointwiseEffect(effect), (), about), about)
+    return model.seen(model.columns(AtPoints(effect, np.eye(len(model.artefact.points))), (), about), about)
 
 
 @dataclass(frozen=True, eq=False)

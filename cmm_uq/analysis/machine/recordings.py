@@ -10,7 +10,7 @@ that of the first is sampled together with the errors' sizes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ import scipy
 from cmm_uq.analysis.machine.state import MachineState, of_machine
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.field import linear as trials
+from cmm_uq.machine.model.field import GivenPeriod, linear as trials
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effect import Effect
@@ -114,10 +114,18 @@ def recorded(model: RecordingModel, effect: Effect) -> bool:
 
 def shown_by(model: RecordingModel, effect: Effect) -> Floats:
     """(m, j) of the used observations for one unit of each coefficient; nothing where its columns were not recorded."""
+    return np.hstack([*shown_in_parts(model, effect)])
+
+
+def shown_in_parts(model: RecordingModel, effect: Effect) -> Iterator[Floats]:
+    """The same, of some of the coefficients after the others."""
     if not recorded(model, effect):
-        return np.zeros((int(model.used.sum()), len(effect.coefficients)))
+        yield np.zeros((int(model.used.sum()), len(effect.coefficients)))
+        return
     about = model.estimate().about
-    return model.seen(model.columns(effect, (), about), about)
+    acting = model.about(about)
+    for part in effect.parts(acting.points) if isinstance(effect, GivenPeriod) else (effect,):
+        yield model.seen(acting.columns(part), about)
 
 
 def sd_of(effect: Effect) -> Floats:

@@ -34,7 +34,7 @@ from cmm_uq.analysis.machine.performance import (
     performance_of,
     rows_of,
 )
-from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings, recorded, shown_by
+from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings, recorded, shown_in_parts
 from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, stated_as, unmodelled_errors
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
@@ -79,6 +79,7 @@ def with_readings(others: Iterable[Unmodelled], machine: Machine) -> tuple[Unmod
 DRAWS = 2000
 _ABSENT = 1e-4  # size of a family of errors that are not there
 _ERRORS, _LEAST = 4_000_000, 200  # errors of lengths that are drawn, and how often each at least
+_AT_ONCE = 2000  # lengths, each by every coefficient of the machine, that memory holds
 _MOST = 100  # quantities of a recording, with their repeats: time grows with the cube of what they show
 _EACH = 5  # points along each axis of a region
 _ANYWHERE = ("ppm", "″", "″/m")  # units of what means the same on a part of a travel; a bow is one of the whole travel
@@ -184,25 +185,27 @@ class DrawnErrors:
         steps = np.diff(artefact.points.xyz[rows], axis=1)[:, 0]
         along = artefact.lines_of(rows)[1]
         along = along * (np.sign(np.sum(along * steps, axis=1)) / np.linalg.norm(along, axis=1))[:, None]
+        acting, k, own = model.about(about), own.shape[1], own - about[: own.shape[1]]
 
-        def seen(errors: Floats) -> Floats:
-            return np.asarray(np.einsum("mi,mik->mk", along, errors[rows[:, 0]] - errors[rows[:, 1]]))
-
-        def points_of(effect: Effect) -> Floats:
-            if recorded(model, effect):
-                return model.columns(effect, (), about)
-            return np.zeros((len(artefact.points), 3, len(effect.coefficients)))  # as other recordings show it
-
-        def of_effects(effects: Sequence[Effect]) -> Floats:
-            none = np.zeros((len(rows), 0))
-            return np.hstack([none, *(seen(points_of(one)) for one in effects)])
+        def added(some: Ints) -> Floats:
+            which, ends = np.unique(rows[some], return_inverse=True)
+            there, (a, b) = acting.select(which), ends.reshape(-1, 2).T
+            columns = [np.zeros((len(some), 0))]
+            for one in (*model.effects, *self.field.effects):
+                if recorded(model, one):
+                    errors = there.columns(one)
+                    columns.append(np.einsum("mi,mik->mk", along[some], errors[a] - errors[b]))
+                else:  # as other recordings show it
+                    columns.append(np.zeros((len(some), len(one.coefficients))))
+            each = np.hstack(columns).T
+            return np.asarray(own @ each[:k] + further @ each[k:])
 
         shown, true = (
             np.linalg.norm(np.diff(xyz[rows], axis=1)[:, 0], axis=1)
             for xyz in (model.predicted(about), model.placed(about))
         )
-        named, others = of_effects(model.effects), of_effects(self.field.effects)
-        return np.asarray(shown - true + (own - about[: own.shape[1]]) @ named.T + further @ others.T)
+        parts = np.array_split(np.arange(len(rows)), 1 + len(rows) // _AT_ONCE)
+        return np.asarray(shown - true + np.hstack([added(some) for some in parts]))
 
 
 def other_errors(model: RecordingModel) -> list[Unmodelled]:
@@ -319,7 +322,7 @@ def as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPos
     """(k, j) by which the estimates of the named errors change with a unit of each coefficient of others."""
     estimate = model.estimate()
     weights = gain(estimate.linear, float(np.median(posterior.sigma)))[: field.modelled]
-    return np.hstack([weights @ shown_by(model, one) for one in field.effects])
+    return np.hstack([weights @ part for one in field.effects for part in shown_in_parts(model, one)])
 
 
 def disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floats) -> tuple[Key, ...]:

@@ -18,7 +18,7 @@ readings would seem to determine them all. So a draw of the sum is a draw before
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cache
@@ -52,7 +52,7 @@ READ: Mapping[str, Text] = {  # of axes of which it is stated how they are read
 # root mean square that physics allows: µm along an axis beyond its scale, µm across it, ″
 ALLOWED = {POSITION: 20.0, STRAIGHTNESS: 50.0, ROTATION: 30.0}
 _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
-_AT_ONCE = 1_000_000  # covariances of readings that are held at once
+_AT_ONCE = 1_000_000  # covariances of readings, or displacements, that are held at once
 _LOOKED_AT = 61  # readings
 TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
 _EACH = 4  # of these in each band, where the size of an error goes by its period
@@ -143,6 +143,16 @@ def allowed(family: str) -> tuple[float, str]:
     return most, str(one.coefficients[0].unit)
 
 
+class AtPoints(Effect):
+    """Displacements (n, j), mm, of points by themselves along the axis of another effect."""
+
+    def __init__(self, of: Effect, component: Floats) -> None:
+        self.name, self.mechanism, self.along_motion, self.component = of.name, of.mechanism, of.along_motion, component
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return along(str(self.along_motion), self.component)
+
+
 class EveryPeriod(Effect):
     """All trial periods of an effect at once; without a shape of its own."""
 
@@ -188,17 +198,23 @@ class GivenPeriod(Effect):
         self.coefficients = (*self.sum.coefficients, *said)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        found = np.zeros((len(points), 3, len(self.coefficients)))
-        found[:, "xyz".index(self.axis)] = self.at(points.readings[self.axis])
-        return found
+        return along(self.axis, self.at(points.readings[self.axis]))
+
+    def parts(self, points: Points) -> Iterator[Effect]:
+        """Some of its coefficients each, at these points alone: all together at a hundred thousand fill half a gigabyte."""
+        reading, periods = points.readings[self.axis], np.ravel(self.sum.at)
+        for some in np.array_split(periods, 1 + 2 * len(reading) * len(periods) // _AT_ONCE):
+            yield AtPoints(self, _waves(reading, some))
+        for some in np.array_split(self._said(reading), 1 + len(reading) * self.into.shape[1] // _AT_ONCE, axis=1):
+            yield AtPoints(self, some)
 
     def at(self, reading: Floats) -> Floats:
         """(n, j) mm of error at readings (n,): of the trials, then of the combinations."""
+        return np.hstack([_waves(reading, np.ravel(self.sum.at)), self._said(reading)])
+
+    def _said(self, reading: Floats) -> Floats:
         parts = np.array_split(reading, 1 + len(reading) * len(self.readings) // _AT_ONCE)
-        said = np.concatenate([covariance(self.of, part, self.readings) @ self.into for part in parts])
-        angle = 2 * np.pi * reading[:, None] / np.ravel(self.sum.at)
-        waves = MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
-        return np.hstack([waves, said])
+        return np.concatenate([covariance(self.of, part, self.readings) @ self.into for part in parts])
 
     def beforehand(self, random: np.random.Generator, count: int) -> Floats:
         """Draws (N, j) of the coefficients over their standard deviations, without the recording.
@@ -221,6 +237,12 @@ class GivenPeriod(Effect):
         between = np.linspace(self.readings.min(), self.readings.max(), _LOOKED_AT)
         left = (draws @ self.at(between).T).var(axis=0).mean()
         return float(np.sqrt(left) / (MICROMETRE * self.of.coefficients[0].prior_sd))
+
+
+def _waves(reading: Floats, periods: Floats) -> Floats:
+    """(n, 2p) mm, sine and cosine of each period."""
+    angle = 2 * np.pi * reading[:, None] / periods
+    return MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
 
 
 def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:

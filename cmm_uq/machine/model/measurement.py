@@ -275,8 +275,12 @@ class RecordingModel:
 
     def columns(self, effect: Effect, shape: Sequence[float], values: Floats) -> Floats:
         """Errors e of the points, (n, 3, j) in mm, for one unit of each coefficient of one effect beside the model's own."""
+        return self.about(values).columns(effect, shape)
+
+    def about(self, values: Floats) -> About:
+        """Where the model is linear at ``values``, for errors beside its own too."""
         model, about = (self, values) if self.within is None else (self.within, self.within.estimate().about)
-        return model._about(about).columns(effect, shape)
+        return model._about(about)
 
     def _about(self, values: Floats) -> About:
         key = values.tobytes()

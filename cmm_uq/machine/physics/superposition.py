@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.arm import Arm
-from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.machine.physics import kinematics
 from cmm_uq.machine.physics.effect import ARTEFACT, Effect
 from cmm_uq.machine.physics.effects.joints import OfRows, arm_of
@@ -48,6 +48,11 @@ class About:
         found = basis.copy()
         found[:, :, 0] = (turned.T * effect.lean(self.points)).T
         return found
+
+    def select(self, rows: Ints) -> About:
+        """Of some of the points."""
+        change = self.change if self.change is None or self.change.ndim == 3 else self.change[:, rows]
+        return About(self.points.select(rows), change)
 
 
 @dataclass(frozen=True, eq=False)
