@@ -11,15 +11,19 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from benchmarks.hostile.invariants import STOPS, Outcome, lost, problems, set_problems, snapshot
 from benchmarks.hostile.processes import COMMANDS, OUT, contents, emptied, memory, put, reference, run, taken_for_a_set
+from benchmarks.hostile.warm import Warm
 
 CALLS = ("rename", "renameat", "renameat2", "link", "linkat", "symlink", "symlinkat", "unlink", "unlinkat", "mkdir",
          "mkdirat", "rmdir", "write", "pwrite64", "ftruncate", "fsync", "fdatasync", "flock")  # fmt: skip
 """System calls that change what lies on the disk, or say that it stays."""
 SIGNALS = ("SIGKILL", "SIGKILL", "SIGINT", "SIGTERM")
+SHARES = {"simulate": 6.0, "compensate": 4.0, "budget": 4.0, "plan": 2.0, "diagnose": 1.0, "report": 2.0}
+"""How often each command is hit: the cheap ones more often."""
 AT_ONCE = 0.3
 """Seconds within which a process that was all but done may still end with 0 after a signal."""
 NOTHING = re.compile(r"nothing (was|is|has been) (written|changed)")
@@ -67,12 +71,15 @@ def _at(folder: Path, name: str, call: tuple[str, int]) -> list[str]:
     return _strace(folder, "-e", f"trace={call[0]}", "-e", f"inject={call[0]}:signal={name}:when={call[1]}")
 
 
-def calls(command: str, *, over: bool) -> list[tuple[str, int]]:
+def calls(command: str, *, over: bool, warm: Warm | None = None) -> list[tuple[str, int]]:
     """Every system call of a command that changes the disk, by name and how many of that name came before."""
     with tempfile.TemporaryDirectory(dir=memory()) as folder:
         _prepare(Path(folder), command, over=over)
-        prefix = _strace(Path(folder), "--seccomp-bpf", "-e", f"trace={','.join(CALLS)}")
-        run(COMMANDS[command].arguments(), Path(folder), prefix=prefix)
+        trace = "-e", f"trace={','.join(CALLS)}"
+        if warm is None:
+            run(COMMANDS[command].arguments(), Path(folder), prefix=_strace(Path(folder), "--seccomp-bpf", *trace))
+        else:
+            warm.run(COMMANDS[command].arguments(), Path(folder), traced=_strace(Path(folder), *trace))
         lines = (Path(folder) / "trace").read_text(errors="replace").splitlines()
     first = lines[0].split()[0] if lines else ""
     counts = Counter(match[1] for line in lines if line.startswith(first)
@@ -121,22 +128,37 @@ def _prepare(folder: Path, command: str, *, over: bool) -> None:
         put(folder / OUT, reference(command, 0))
 
 
-def strike(kill: Kill, folder: Path) -> tuple[Outcome, list[str]]:
-    """Kill a command, look at what it left, run it again, and say what does not hold."""
+def chosen(seed: int, number: int, warm: Warm | None) -> Kill:
+    """A kill at one of the calls of one of the commands; ``warm``: where its process is forked."""
+    random_ = random.Random(f"calls:{seed}:{number}")
+    (command,) = random_.choices(list(SHARES), list(SHARES.values()))
+    over, name = random_.random() < 0.5, random_.choice(SIGNALS)
+    return Kill(command, over, name, random_.choice(_calls(command, over, warm)))
+
+
+@cache
+def _calls(command: str, over: bool, warm: Warm | None) -> list[tuple[str, int]]:
+    return calls(command, over=over, warm=warm)
+
+
+def strike(kill: Kill, folder: Path, warm: Warm | None = None) -> tuple[Outcome, list[str]]:
+    """Kill a command, look at what it left, run it again, and say what does not hold; forked, where there is a warm one."""
     emptied(folder)
     command, never = COMMANDS[kill.command], False
     _prepare(folder, kill.command, over=kill.over)
     before = snapshot(folder)
+    start: Callable[..., Outcome] = run if warm is None else warm.run
     if kill.call:
-        outcome = run(command.arguments(), folder, prefix=_at(folder, kill.signal, kill.call))
+        at = _at(folder, kill.signal, kill.call)
+        outcome = start(command.arguments(), folder, **{"prefix" if warm is None else "traced": at})
         trace = folder / "trace"
         never = not re.search(rf"--- {kill.signal} |killed by {kill.signal} ", trace.read_text(errors="replace"))
         outcome = _since_signal(outcome, trace)
         trace.unlink(missing_ok=True)
     else:
-        outcome = run(command.arguments(), folder, kill=(getattr(signal, kill.signal), kill.after))
+        outcome = start(command.arguments(), folder, kill=(getattr(signal, kill.signal), kill.after))
     found = ["the signal never came"] * never + _after_signal(kill, outcome, folder, before)
-    again = run(command.arguments(), folder)
+    again = start(command.arguments(), folder)
     if again.code != 0:
         found.append(f"the next run ends with {again.code}")
     found += [f"after the next run: {problem}" for problem in (*problems(again), *set_problems(folder / OUT))]

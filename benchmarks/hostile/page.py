@@ -15,6 +15,7 @@ PARTS = {
     "programs": ("Hostile files for every command, each a process", "command"),
     "signatures": ("Attacks on signatures", "form"),
     "acquisitions": ("Live recordings killed while points are accepted", "signal"),
+    "calls": ("Kills at system calls that change the disk", "command and signal"),
     "terminals": ("Pseudo-terminals that vanish, are silent or babble", "command"),
     "kills": ("Kills and interruptions", "command and signal"),
     "disk": ("Places that cannot be written to", "command"),

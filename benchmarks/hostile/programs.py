@@ -1,4 +1,4 @@
-"""Parts of the study whose cases are processes of the command, one at a time: hostile files, live recordings, terminals."""
+"""Parts of the study whose cases are processes of the command, one at a time: files, recordings, kills, terminals."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.hostile import acquisitions as recording, every_command, processes, terminals as lines
+from benchmarks.hostile import acquisitions as recording, every_command, kills, processes, terminals as lines
 from benchmarks.hostile.cases import Case
 from benchmarks.hostile.invariants import Outcome
 from benchmarks.hostile.warm import Warm
@@ -42,6 +42,17 @@ def acquisitions(seed: int, root: Path, numbers: Sequence[int]) -> Iterator[dict
             shutil.rmtree(root / f"{number}")
             what = recording.what(seed, number)
             yield _record(number, what.split()[0], what, outcome, found) | {"accepted": accepted}
+
+
+def calls(seed: int, root: Path, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """Kills at system calls that change the disk."""
+    with Warm() as warm:
+        for number in numbers:
+            forked = None if number % STARTED == 0 else warm
+            kill = kills.chosen(seed, number, forked)
+            outcome, found = kills.strike(kill, root / f"{number}", forked)
+            shutil.rmtree(root / f"{number}")
+            yield _record(number, f"{kill.command}, {kill.signal}", f"{kill.command}, {kill.what}", outcome, found)
 
 
 def terminals(root: Path, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:

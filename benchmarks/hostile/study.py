@@ -32,11 +32,8 @@ from benchmarks.hostile.processes import COMMANDS, memory
 
 ROOT = Path(__file__).parents[2]
 SAVED_EVERY = 20
-RESUMED = ("mutations", "commands", "programs", "signatures", "acquisitions", "terminals")
+RESUMED = ("mutations", "commands", "programs", "signatures", "acquisitions", "calls", "terminals")
 PAGE = ROOT / "docs" / "hostile-study.md"
-RANDOM_SHARES = {"simulate": 6.0, "compensate": 4.0, "budget": 4.0, "plan": 2.0, "diagnose": 1.0, "report": 2.0}
-"""How often each command is hit at a random moment: the cheap ones more often."""
-
 Trial = tuple[str, str, Callable[[Path], tuple[Outcome, list[str]]]]
 """Kind, words, and what runs it in an empty folder."""
 
@@ -47,7 +44,7 @@ def trials(part: str, options: argparse.Namespace) -> Iterator[Trial]:
         traced = kills.available()
         if not traced:
             print("strace may not trace here: all kills come at random moments", file=sys.stderr)
-        for kill in kills.plan(options.kills, options.seed, RANDOM_SHARES, traced):
+        for kill in kills.plan(options.kills, options.seed, kills.SHARES, traced):
             yield f"{kill.command}, {kill.signal}", kill.what, partial(kills.strike, kill)
     elif part == "disk":
         mount = disk.may_mount()
@@ -79,6 +76,7 @@ def _runs(tally: Tally, options: argparse.Namespace, work: Path) -> Callable[[Se
     runs = {"mutations": partial(_pooled, options, work, "mutations"), "commands": partial(_pooled, options, work, "commands"),
             "signatures": partial(signatures.run, options.seed), "programs": partial(programs.altered, options.seed, work),
             "acquisitions": partial(programs.acquisitions, options.seed, work),
+            "calls": partial(programs.calls, options.seed, work),
             "terminals": partial(programs.terminals, work)}  # fmt: skip
     return runs[tally.part]
 
@@ -91,6 +89,7 @@ def count_of(part: str, options: argparse.Namespace) -> int:
             "signatures": options.attacks,
             "programs": options.programs,
             "acquisitions": options.acquisitions,
+            "calls": options.calls,
             "terminals": len(terminals.trials()),
         }[part]
     )
@@ -194,6 +193,7 @@ def main(arguments: Iterable[str] | None = None) -> int:
     parser.add_argument("--each", type=int, default=50, help="cases of each command line, in process")
     parser.add_argument("--programs", type=int, default=2000, help="cases of all commands, each a process")
     parser.add_argument("--acquisitions", type=int, default=1000, help="kills of cmm-uq acquire")
+    parser.add_argument("--calls", type=int, default=1000, help="kills at system calls that change the disk")
     parser.add_argument("--workers", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--part", choices=PARTS, action="append")

@@ -12,6 +12,7 @@ import importlib
 import json
 import os
 import pkgutil
+import re
 import runpy
 import select
 import signal
@@ -40,17 +41,18 @@ class Warm(contextlib.AbstractContextManager["Warm"]):
         self.pid = 0
 
     def start(self, arguments: Sequence[str], cwd: Path, *, streams: Sequence[Path | str] = ("/dev/null",) * 3,
-              environment: Mapping[str, str] | None = None) -> int:  # fmt: skip
+              environment: Mapping[str, str] | None = None, stopped: bool = False) -> int:  # fmt: skip
         """Begin a command; its process.
 
         Parameters
         ----------
         streams : files of standard input, output and error, opened by the command's process.
         environment : variables beside those that there are.
+        stopped : it waits for SIGCONT before it does anything.
         """
         assert self._server.stdin is not None
         asked = {"arguments": arguments, "cwd": str(cwd), "streams": list(map(str, streams)),
-                 "environment": dict(environment or {})}  # fmt: skip
+                 "environment": dict(environment or {}), "stopped": stopped}  # fmt: skip
         self._server.stdin.write(json.dumps(asked).encode() + b"\n")
         self._server.stdin.flush()
         self.pid = int(self._reply()["pid"])
@@ -65,12 +67,14 @@ class Warm(contextlib.AbstractContextManager["Warm"]):
         return int(reply["code"]), reply["seconds"]
 
     def run(self, arguments: Sequence[str], cwd: Path, *, kill: tuple[int, float] | None = None, limit: float = 120.0,
-            environment: Mapping[str, str] | None = None) -> Outcome:  # fmt: skip
-        """As :func:`benchmarks.hostile.processes.run`."""
+            environment: Mapping[str, str] | None = None, traced: Sequence[str] = ()) -> Outcome:  # fmt: skip
+        """As :func:`benchmarks.hostile.processes.run`; ``traced`` by strace with its options, attached to the process."""
         with tempfile.NamedTemporaryFile() as stdout, tempfile.NamedTemporaryFile() as stderr:
             for file in (stdout, stderr):
                 Path(file.name).chmod(0o666)
-            self.start(arguments, cwd, streams=("/dev/null", stdout.name, stderr.name), environment=environment)
+            streams = ("/dev/null", stdout.name, stderr.name)
+            self.start(arguments, cwd, streams=streams, environment=environment, stopped=bool(traced))
+            tracer = _attached(traced, self.pid) if traced else None
             sent = 0.0
             ended = self.ended(kill[1] if kill else limit)
             if ended is None and kill:
@@ -81,6 +85,8 @@ class Warm(contextlib.AbstractContextManager["Warm"]):
             if ended is None:
                 os.killpg(self.pid, signal.SIGKILL)
                 self.ended(limit)
+            if tracer is not None:
+                tracer.communicate()
             said = [os.pread(file.fileno(), 1 << 20, 0).decode("utf-8", "replace") for file in (stdout, stderr)]
         code, computed = ended or (None, limit)
         return Outcome(code, *said, since if kill else computed)
@@ -98,10 +104,23 @@ class Warm(contextlib.AbstractContextManager["Warm"]):
                     pipe.close()
 
 
+def _attached(traced: Sequence[str], process: int) -> subprocess.Popen[bytes]:
+    """A tracer of a process that is stopped, which goes on once it is attached to."""
+    while Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "T":
+        time.sleep(0.001)
+    tracer = subprocess.Popen([*traced, "-p", str(process)], stderr=subprocess.PIPE)
+    while re.search(r"TracerPid:\t0\n", Path(f"/proc/{process}/status").read_text()):
+        time.sleep(0.001)
+    os.kill(process, signal.SIGCONT)
+    return tracer
+
+
 def _become(asked: dict, reply: int) -> None:
     """In the forked process: its folder, user, streams and arguments, as if it had just been started."""
     os.close(reply)
     os.setsid()
+    if asked["stopped"]:
+        os.kill(os.getpid(), signal.SIGSTOP)
     os.environ.update(asked["environment"])
     with contextlib.suppress(OSError):  # a folder that this user may not enter
         os.chdir(asked["cwd"])

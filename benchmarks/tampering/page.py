@@ -12,8 +12,7 @@ FOUND = ("NOT VERIFIED", "REFUSED")
 
 
 def written(
-    altered: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]], commands: Sequence[dict[str, Any]], *, seed: int,
-    commit: str,
+    altered: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]], commands: Sequence[dict[str, Any]], *, seed: int
 ) -> str:  # fmt: skip
     """The page; what there are fewer of than are wanted is said."""
     found = [one for one in altered if _told(one)]
@@ -24,12 +23,13 @@ def written(
     lines = [
         "# Alterations of certificates", "",
         "Written by `python benchmarks/tampering/study.py`, which reruns all of it; `--only 17` repeats one case.",
-        f"Seed {seed}, commit `{commit}`. Each case alters one thing of one certificate or diagnosis and verifies what",
+        f"Seed {seed}. Each case alters one thing of one certificate or diagnosis and verifies what",
         "an auditor has of it: the PDF alone, the PDF with further forms, or everything but the PDF.",
         "The generator of alterations knows files, not the package.", "",
-        "| | cases | found | without computing again | changes nothing stated | not found | seconds, median |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-        f"| altered | {len(altered)} | {len(found)} | {len(without)} | {len(neutral)} | {len(missed)} | {_median(altered)} |",
+        "| | cases | found | without computing again | changes nothing stated | not found | seconds, median | at |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        f"| altered | {len(altered)} | {len(found)} | {len(without)} | {len(neutral)} | {len(missed)} | {_median(altered)} "
+        f"| {_versions(altered)} |",
         "", "What changes nothing that is stated is an input altered together with its hash, so that the files are a",
         "certificate of that input; computed again from it, every figure and the page are the same to the byte, as of a",
         "coordinate that the kind does not use, or of the order of two keys.", "",
@@ -39,10 +39,10 @@ def written(
         "", "## Good certificates", "",
         "Examples with noise of 0.01 µm to 1 µm more on their readings, another seed, other words, in a language by lot,",
         "signed or not, made and verified with computing again in full: in a process that goes on to the next one, and by",
-        "the commands.", "", "| | certificates | signed | refused or not wholly verified | seconds, median |",
-        "| --- | --- | --- | --- | --- |",
+        "the commands.", "", "| | certificates | signed | refused or not wholly verified | seconds, median | at |",
+        "| --- | --- | --- | --- | --- | --- |",
         *(f"| {what} | {len(some)} | {sum(one['signed'] for one in some)} | "
-          f"{sum(one in refused for one in some)} | {_median(some)} |"
+          f"{sum(one in refused for one in some)} | {_median(some)} | {_versions(some)} |"
           for what, some in (("in process", good), ("by the commands", commands))), "",
         *_of_good([*good, *commands]), "", "## By form and alteration", "",
         "| form | alteration | cases | found | without computing again |", "| --- | --- | --- | --- | --- |",
@@ -92,6 +92,11 @@ def _told(one: dict[str, Any]) -> bool:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("\n", " ")[:120]
+
+
+def _versions(records: Sequence[dict[str, Any]]) -> str:
+    """At which commits, and how many at each."""
+    return ", ".join(f"`{commit}` ({count})" for commit, count in Counter(one["commit"] for one in records).items())
 
 
 def _median(records: Sequence[dict[str, Any]]) -> str:

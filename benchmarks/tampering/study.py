@@ -58,11 +58,8 @@ def main() -> None:
         _run(partial(_altered, work), files["altered"], options.cases, options.workers)
         _run(partial(_good, work), files["good"], options.good, options.workers)
         _run(partial(_by_command, work), files["commands"], options.commands, options.workers)
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
-    ).stdout.strip()
     altered, good, commands = map(_records, files.values())
-    text = page.written(altered, good, commands, seed=SEED, commit=commit)
+    text = page.written(altered, good, commands, seed=SEED)
     (ROOT / "docs" / "tampering-study.md").write_text(text, encoding="utf-8")
 
 
@@ -82,11 +79,12 @@ def _run(work: Any, path: Path, count: int, workers: int) -> None:
         path.write_bytes(path.read_bytes() + b"\n")
     done = {record["number"] for record in _records(path)}
     left = [number for number in range(count) if number not in done]
-    began = time.monotonic()
+    began, command = time.monotonic(), ["git", "rev-parse", "--short=8", "HEAD"]
+    commit = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip()
     spawn = multiprocessing.get_context("spawn")
     with spawn.Pool(workers, maxtasksperchild=400) as pool, path.open("a", encoding="utf-8") as file:
         for record in pool.imap_unordered(work, left, chunksize=1):
-            file.write(json.dumps(record, ensure_ascii=False) + "\n")
+            file.write(json.dumps(record | {"commit": commit}, ensure_ascii=False) + "\n")
             file.flush()
     print(f"{path.name}: {len(left)} in {time.monotonic() - began:.0f} s")
 
