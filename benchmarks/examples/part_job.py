@@ -33,6 +33,12 @@ LARGER_MM, BESIDE_MM = 0.012, np.array([0.015, -0.010, 0.0])
 DRAWN = f"""Simulated, no part was measured. True: bore {LARGER_MM:g} mm larger than its nominal and beside its place by \
 {BESIDE_MM[0]:g} mm along x and {BESIDE_MM[1]:g} mm along y, all else nominal but for form; seed {SEED}."""
 
+NEGLIGIBLE = {
+    "clamping": {"by": "the simulation", "reason": "nothing was clamped"},
+    "operators": {"by": "the simulation", "reason": "nobody measured"},
+    "gradients": {"by": "the simulation", "reason": "the part was simulated at one temperature"},
+}  # fmt: skip
+
 
 def true_part(plan: Plan) -> Floats:
     """(n, 3) points of the part as it is."""
@@ -52,6 +58,8 @@ def main() -> None:
             "remarks": DRAWN}  # fmt: skip
     head = "# Simulated with benchmarks/examples/part_job.py: no part and no machine was measured.\n\n"
     tables = {"job": said, **TABLES, "machine_state": {"certificate": "machine", "valid_until": dt.date(2026, 12, 31)}}
+    tables |= {"environment": {"u_part_k": 0.1, "u_scales_k": 0.1, "scales_cte_per_k": 0.0}, "negligible": NEGLIGIBLE}
+    tables = {name: table for name, table in tables.items() if name not in ("placing", "probing")}
     (FOLDER / "job.toml").write_bytes(head.encode() + as_toml(tables, "job.toml"))
     job = read_part(FOLDER)
     plan = plan_of(job)

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.examples.part_job import NEGLIGIBLE
 from benchmarks.examples.simulated_jobs import MACHINE, bryan
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.causes.machine import STYLUS
@@ -100,7 +101,7 @@ TABLES: Mapping[str, Any] = {
     ],
     "alignment": {"datums": ["A", "B", "C"]},
     "placing": {"origin_mm": ORIGIN.tolist()},
-    "environment": {"u_part_k": 0.05, "u_scales_k": 0.05},
+    "environment": {"u_part_k": 0.05, "u_scales_k": 0.05, "scales_cte_per_k": 0.0},
     "form": {"field_um": 0.5, "roughness_um": 0.2},
     "characteristic": [
         {"name": "1", "what": "size", "features": ["large"], "lower_mm": 29.97, "upper_mm": 30.03},
@@ -108,6 +109,7 @@ TABLES: Mapping[str, Any] = {
         {"name": "3", "what": "distance", "features": ["large", "B"], "lower_mm": 39.95, "upper_mm": 40.05},
         {"name": "4", "what": "x", "features": ["small"], "datums": ["A", "B", "C"], "lower_mm": 24.95, "upper_mm": 25.05},
     ],
+    "negligible": {**NEGLIGIBLE, "lobing": {"by": "the simulation", "reason": "the probe was simulated without"}},
 }  # fmt: skip
 """Tables of job.toml but ``[job]`` and those of recordings."""
 

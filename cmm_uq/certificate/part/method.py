@@ -124,6 +124,7 @@ def not_covered_section(found: PartMeasurement) -> Section:
                       names=messages.commas(titles(sorted(lacking))))),
         (unstated, say("Not stated in the job, and so taken to be without uncertainty: {what}.",
                        what=messages.listed(unstated))),
+        *((True, text) for text in _declared(found)),
         (any(one.stated.u == 0 for one in figures_of(found)),
          say("A characteristic with u = 0 is one to which nothing that is stated contributes.")),
         (True, say(
@@ -136,31 +137,39 @@ def not_covered_section(found: PartMeasurement) -> Section:
     )))  # fmt: skip
 
 
+_CAUSES: Mapping[str, Text] = {
+    "lobing": say("pre-travel of the probe by direction"), "clamping": say("clamping"), "operators": say("operators"),
+    "gradients": say("uneven and drifting temperatures"),
+}  # fmt: skip
+
+
+def _declared(found: PartMeasurement) -> list[Text]:
+    """By whom and why causes are negligible."""
+    return [
+        say("{line:capital}: declared negligible by {by}: {reason}.", line=what, by=Verbatim(one.by),
+            reason=Verbatim(one.reason.rstrip(". ")))
+        for name, what in _CAUSES.items() if (one := getattr(found.job.facts.negligible, name))
+    ]  # fmt: skip
+
+
 def _unstated(found: PartMeasurement) -> list[Text]:
-    facts = found.job.facts
-    each, room = facts.characteristic, facts.environment
-    operators = facts.probing.u_operator_um or any(one.u_operator_um or one.u_operator_deg for one in each)
-    styli = any(one.u_diameter_um or one.lobing_um or any(one.u_offset_um) for one in facts.stylus)
+    """Causes of which no uncertainty is stated, or not of all of it, and that nobody declares negligible."""
+    facts, room = found.job.facts, found.job.facts.environment
+    styli, cold = facts.probing_styli, room.part_c == REFERENCE_TEMPERATURE
+    touching = any(one.diameter_mm and not one.u_diameter_um for one in styli)
+    apart = sum(not any(one.u_offset_um) for one in styli) > 1  # one is that to which the others are referred
+    scales = "scales_cte_per_k" in room.model_fields_set and (room.u_scales_k or not room.scales_cte_per_k)
     return holding(
-        (not styli, say("qualification of the styli")), (not (room.u_part_k or room.u_scales_k), say("temperatures")),
-        (not facts.part.u_cte_per_k, say("expansion of the part")),
+        (touching or apart, say("qualification of the styli")), (not (room.u_part_k and scales), say("temperatures")),
+        (not (facts.part.cte_per_k and (facts.part.u_cte_per_k or cold)), say("expansion of the part")),
         (not found.given.forms, say("form and roughness of the part")),
-        (not facts.placing.u_fixture_um, say("clamping")), (not operators, say("operators")),
+        *((name in facts.neither_stated_nor_declared, what) for name, what in _CAUSES.items()),
     )  # fmt: skip
 
 
 def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
-    """That nothing is called conforming by an uncertainty that lacks styli, temperatures, expansion or form."""
-    facts, room = found.job.facts, found.job.facts.environment
-    touching = any(one.diameter_mm and not one.u_diameter_um for one in facts.stylus)
-    cold = room.part_c == REFERENCE_TEMPERATURE
-    without = holding(
-        (touching, say("qualification of the styli")),
-        (not room.u_part_k or (room.scales_cte_per_k and not room.u_scales_k), say("temperatures")),
-        (not (facts.part.cte_per_k and (facts.part.u_cte_per_k or cold)), say("expansion of the part")),
-        (not found.given.forms, say("form and roughness of the part")),
-    )
-    if found.measured is None or not without or not any(found.judged):
+    """That nothing is called conforming by an uncertainty that lacks some cause."""
+    if found.measured is None or not any(found.judged) or not (without := _unstated(found)):
         return ()
     what = messages.listed(without)
     return (say("Nothing is called conforming, for the job states no uncertainty of these: {what}.", what=what),)

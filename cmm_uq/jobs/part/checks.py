@@ -170,6 +170,9 @@ def check_names(facts: PartFile, places: Places, wrong: Gathered) -> None:
     if order and (left or len(order) != len(features)):
         said = f"leaves {left[0]!r} out" if left else "names a feature twice"
         wrong.tell(said, where=where, fix="Name each feature once")
+    for cause in facts.stated_and_declared:
+        wrong.tell("has a figure, and is declared negligible", where=places.of("negligible", cause),
+                   fix="Leave one of the two out")  # fmt: skip
 
 
 def _known(names: Sequence[str], known: Sequence[str], what: str, where: str, wrong: Gathered) -> None:

@@ -168,7 +168,12 @@ TABLES: Mapping[str, Any] = MappingProxyType({
         },
     ],
     "alignment": {"datums": ["A", "B", "C"]},
-    "environment": {"u_part_k": 0.1, "u_scales_k": 0.1},
+    "placing": {"u_fixture_um": 0.2},
+    "probing": {"u_operator_um": 0.1},
+    "environment": {
+        "u_part_k": 0.1, "u_scales_k": 0.1, "scales_cte_per_k": 8e-6, "u_scales_cte_per_k": 1e-6,
+        "u_gradient_k_per_m": [0.1, 0.1, 0.1], "u_drift_k": 0.05,
+    },
     "form": {"field_um": 1.0, "roughness_um": 0.2},
     "characteristic": [
         {"name": "1", "what": "size", "features": ["bore"], "lower_mm": 29.95, "upper_mm": 30.05},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -15,7 +15,7 @@ from cmm_uq.base.files.table import JobTable, Length, Limit, Position, Temperatu
 from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.jobs.part.feature import CharacteristicFacts, Count, Degrees, FeatureFacts, FormFacts, Name
-from cmm_uq.jobs.tables.conformity import Prior, Rule, needs_prior
+from cmm_uq.jobs.tables.conformity import Declared, Prior, Rule, needs_prior
 from cmm_uq.jobs.tables.identification import MEASURED, Identification, Laboratory, Origin
 from cmm_uq.jobs.tables.machine import AxesFacts, FurtherList, Travel, check_carriages
 
@@ -170,6 +170,16 @@ class EnvironmentFacts(JobTable):
     """Standard uncertainty of how much part and scales have warmed from the first point to the last."""
 
 
+class NegligibleCauses(JobTable):
+    """``[negligible]``: causes that contribute nothing worth counting, each with by whom and why; the report prints both."""
+
+    lobing: Declared | None = key(None, "Pre-travel of the probe by direction (`lobing_um` of a stylus).")
+    clamping: Declared | None = key(None, "What clamping does to the part (`u_fixture_um`).")
+    operators: Declared | None = key(None, "Who measures and how (`u_operator_um`).")
+    gradients: Declared | None = None
+    """Gradients of the part's temperature and its drift while it is measured (`u_gradient_k_per_m`, `u_drift_k`)."""
+
+
 class DecisionFacts(JobTable):
     """``[decision]``: by which rule conformity with the drawing is decided."""
 
@@ -317,6 +327,7 @@ class PartFile(JobTable):
     environment: EnvironmentFacts = EnvironmentFacts()
     """Temperatures while the part is measured, and what is known of them."""
     form: FormFacts = key(FormFacts(), "The part's own form and roughness, between the points that are probed.")
+    negligible: NegligibleCauses = key(NegligibleCauses(), "Causes that are declared negligible, by whom and why.")
     characteristic: Annotated[list[CharacteristicFacts], Field(min_length=1, max_length=INPUTS.most)]
     """What the drawing asks for."""
     decision: DecisionFacts = key(DecisionFacts(), "By which rule conformity with the drawing is decided.")
@@ -326,6 +337,32 @@ class PartFile(JobTable):
     """A calibrated part like this one, measured again and again (ISO 15530-3): its uncertainty stands beside this one's."""
     by_orientations: OrientationsFacts | None = None
     """The part in several orientations with standards beside it (ISO/DTS 15530-2 as described): likewise."""
+
+    @property
+    def stated_and_declared(self) -> list[str]:
+        """Causes that have a figure, and are declared negligible."""
+        return [name for name, some in self._of_causes(any).items() if some and getattr(self.negligible, name)]
+
+    @property
+    def neither_stated_nor_declared(self) -> list[str]:
+        """Causes of which nothing is known."""
+        return [name for name, whole in self._of_causes(all).items() if not (whole or getattr(self.negligible, name))]
+
+    def _of_causes(self, of: Callable[[list[float]], bool]) -> dict[str, bool]:
+        """Of each that may be declared negligible whether all, or any, of its figures are stated."""
+        room, common = self.environment, self.probing.u_operator_um
+        return {
+            "lobing": of([one.lobing_um for one in self.probing_styli if one.diameter_mm]),
+            "clamping": bool(self.placing.u_fixture_um),
+            "operators": of([common or one.u_operator_um or one.u_operator_deg for one in self.characteristic]),
+            "gradients": of([max(room.u_gradient_k_per_m), room.u_drift_k]),
+        }
+
+    @property
+    def probing_styli(self) -> list[StylusFacts]:
+        """Those that probe a feature."""
+        probing = {self.stylus_of(one).name for one in self.feature}
+        return [one for one in self.stylus if one.name in probing]
 
     def stylus_of(self, feature: FeatureFacts) -> StylusFacts:
         """The stylus that probes a feature: the one that it names, else the first."""

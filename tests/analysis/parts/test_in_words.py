@@ -38,7 +38,7 @@ def test_every_line_of_a_budget_has_words() -> None:
     characteristic = [{**TABLES["characteristic"][0], "u_operator_um": 1.0}, *TABLES["characteristic"][1:]]
     values = b"characteristic,value_mm\n1,30.00\n2,0.01\n3,0.01\n4,0.01\n5,40.00\n"
     job = measured_of(plate(
-        {"report.csv": values}, recording={"values": "report.csv"}, environment=environment,
+        {"report.csv": values}, recording={"values": "report.csv"}, environment=environment, negligible=None,
         stylus=stylus, characteristic=characteristic, placing={"u_origin_mm": [9.0, 9.0, 0.0],
         "origin_mm": [300.0, 450.0, -500.0], "u_fixture_um": 0.5},
         probing={"u_operator_um": 1.0, "seconds_per_point": 5.0},

@@ -395,7 +395,11 @@ def test_a_complete_report_is_no_draft_and_what_another_lacks_is_named(measured:
 def test_what_is_not_measured_and_not_stated_is_said(measured: PartMeasurement) -> None:
     told = said(section(page(measured), "What is not covered").blocks)
     assert "these are not measured here: M6 thread" in told
-    assert "clamping" in told
+    assert "Clamping: declared negligible by the test: nothing is." in told
+    undeclared = replace(measured, job=replace(measured.job, facts=plate(negligible=None).facts))
+    assert "without uncertainty: clamping, operators and" in said(
+        section(page(undeclared), "What is not covered").blocks
+    )
     assert "qualification of the styli" not in told
     assert "M6 thread" in row_of(measured, "Not covered")
 

@@ -11,10 +11,17 @@ from cmm_uq.jobs.part.feature import FeatureFacts
 from cmm_uq.jobs.part.job import TABLES, PartJob, part_of
 from cmm_uq.jobs.part.probed import Probed, probed
 
+NOBODY = {"by": "the test", "reason": "nothing is"}
+SIMPLE: dict[str, Any] = {
+    "placing": None, "probing": None, "environment": {"u_part_k": 0.1, "u_scales_k": 0.1, "scales_cte_per_k": 0.0},
+    "negligible": dict.fromkeys(("clamping", "operators", "gradients"), NOBODY),
+}  # fmt: skip
+"""The plate with fewer causes."""
+
 
 def tables(**changes: Any) -> dict[str, Any]:
     """Tables of the plate; a table that is given stands in place of its own, ``None`` takes it away."""
-    whole: dict[str, Any] = {"job": {"id": "plate", "date": dt.date(2026, 5, 31)}, **TABLES, **changes}
+    whole: dict[str, Any] = {"job": {"id": "plate", "date": dt.date(2026, 5, 31)}, **TABLES, **SIMPLE, **changes}
     return {name: table for name, table in whole.items() if table is not None}
 
 

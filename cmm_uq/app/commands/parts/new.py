@@ -153,7 +153,8 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
         raise CmmUqError("must be a list of names", where=KEY, fix='Write it as \'["NAME", "NAME"]\'')
     set_aside_unsound(drawing, where)
     left_out = drawing.settled(without, where)
-    example = {name: _copied(TABLES[name]) for name in ("machine_state", "stylus", "environment", "form")}
+    examples = ("machine_state", "stylus", "placing", "probing", "environment", "form")
+    example = {name: _copied(TABLES[name]) for name in examples}
     holes = [one["diameter_mm"] for one in drawing.features if one.get("inner") and one.get("diameter_mm")]
 
     def tip(usual: float) -> float:
@@ -167,7 +168,7 @@ def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]: 
     }  # fmt: skip
     said = {name: dict(keys) for name, keys in given.items()}
     said.get(PART, {}).pop("not_measured", None)
-    marked = {f"{name}.{key}" for name in ("machine_state", "environment", "form") for key in whole[name]}
+    marked = {f"{name}.{key}" for name in examples if name != "stylus" for key in whole[name]}
     marked |= set() if drawing.styli else {f"stylus.{key}" for key in whole["stylus"][0]}
     marked |= {"alignment.best_fit"}
     opened = {name: set(keys) for name, keys in drawing.open_keys.items()}

@@ -185,6 +185,7 @@ def test_the_plan_says_what_the_job_says() -> None:
 def test_circumstances_are_in_the_units_of_the_virtual_measurement() -> None:
     job = plate(
         placing={"origin_mm": [300.0, 450.0, -500.0], "rotation_deg": [0.0, 0.0, 90.0], "u_fixture_um": 0.5},
+        negligible=None,
         environment={
             "part_c": 21.0,
             "scales_c": [20.5, 20.6, 20.7],

@@ -32,6 +32,7 @@ from cmm_uq.certificate.verify.given import Inquiry
 from cmm_uq.jobs.part.job import TABLES
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
+from tests.jobs.part.parts import NOBODY, plate, tables
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
 from tests.result_keys import PART_RESULTS
 
@@ -355,7 +356,11 @@ def test_temperatures_outside_of_the_calibrations_are_told() -> None:
     ("environment", {"u_part_k": 0.0}, "temperatures"),
     ("part", {"cte_per_k": 0.0}, "expansion of the part"),
     ("part", {"u_cte_per_k": 0.0}, ""),  # at 20 °C it acts on nothing
-    ("stylus", {"u_diameter_um": 0.0, "lobing_um": 0.0}, "qualification of the styli"),
+    ("stylus", {"u_diameter_um": 0.0, "lobing_um": 0.0},
+     "qualification of the styli and pre-travel of the probe by direction"),
+    ("stylus", {"lobing_um": 0.0}, "pre-travel of the probe by direction"),
+    ("negligible", {"clamping": None}, "clamping"),
+    ("negligible", {"operators": None, "gradients": None}, "operators and uneven and drifting temperatures"),
     ("stylus", {"u_diameter_um": 0.0}, "qualification of the styli"),
     ("stylus", {"u_diameter_um": 0.0, "lobing_um": 0.0, "diameter_mm": 0.0}, ""),
 ])  # fmt: skip
@@ -368,6 +373,39 @@ def test_a_decision_says_of_what_no_uncertainty_is_stated(table: str, changes: d
     assert not decided_without(replace(there, measured=None))
 
 
+@pytest.mark.parametrize(("changes", "lacks"), [
+    ({}, ""),
+    ({"placing": {"u_fixture_um": 0.1}, "probing": {"u_operator_um": 0.1}, "negligible": None},
+     "uneven and drifting temperatures"),
+    ({"environment": {"u_part_k": 0.1, "u_scales_k": 0.1}}, "temperatures"),  # of the scales' expansion not a word
+    ({"environment": {"u_part_k": 0.1, "scales_cte_per_k": 0.0, "u_gradient_k_per_m": [0.1, 0.1, 0.1], "u_drift_k": 0.1},
+      "negligible": {"clamping": NOBODY, "operators": NOBODY}}, ""),
+    ({"negligible": None}, "clamping, operators and uneven and drifting temperatures"),
+])  # fmt: skip
+def test_what_may_be_declared_negligible_is_stated_or_declared(changes: dict[str, Any], lacks: str) -> None:
+    found = shifted()
+    there = replace(found, job=replace(found.job, facts=plate(**changes).facts))
+    assert [str(text).rpartition(": ")[2] for text in decided_without(there)] == ([f"{lacks}."] if lacks else [])
+
+
+@pytest.mark.parametrize(("offsets", "lacks"), [
+    ([[0.0, 0.0, 0.0], [0.1, 0.1, 0.1]], False), ([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], True),
+])  # fmt: skip
+def test_tips_whose_places_to_each_other_nobody_states_pass_nothing(offsets: list[list[float]], lacks: bool) -> None:
+    (down,), features = tables()["stylus"], tables()["feature"]
+    styli = [down | {"name": name, "u_offset_um": u} for name, u in zip(("down", "side"), offsets, strict=True)]
+    probed = [one | {"stylus": "side" if one["name"] == "bore" else "down"} for one in features]
+    found = shifted()
+    there = replace(found, job=replace(found.job, facts=plate(stylus=styli, feature=probed).facts))
+    assert bool(decided_without(there)) == lacks
+
+
+def test_what_is_stated_and_declared_is_refused() -> None:
+    with pytest.raises(CmmUqError, match="has a figure, and is declared negligible") as raised:
+        plate(placing={"u_fixture_um": 0.1})
+    assert "[negligible] clamping" in str(raised.value.where)
+
+
 @pytest.mark.parametrize(("environment", "form", "lacks"), [
     ({}, {}, ""), ({"scales_cte_per_k": 1e-5}, {}, ""), ({"scales_cte_per_k": 1e-5, "u_scales_k": 0.0}, {}, "temperatures"),
     ({"u_part_k": 0.0}, {"field_um": 0.0, "roughness_um": 0.0}, "temperatures and form and roughness of the part"),
@@ -376,7 +414,8 @@ def test_nothing_conforms_by_an_uncertainty_that_lacks_what_the_job_does_not_sta
     environment: dict[str, float], form: dict[str, float], lacks: str
 ) -> None:
     """A plate measured without an error, which passed with a warning."""
-    changes = {name: TABLES[name] | table for name, table in (("environment", environment), ("form", form))}
+    plain = tables()
+    changes = {name: plain[name] | table for name, table in (("environment", environment), ("form", form))}
     found = evaluate_part(plate_of(by_results(), np.zeros((60, 3)), **changes, **THERE), PartOptions(trials=1000))
     told = [f"Nothing is called conforming, for the job states no uncertainty of these: {lacks}."] if lacks else []
     assert [str(text) for text in found.withheld] == told == [str(one) for one in found.warnings if str(one) in told]
