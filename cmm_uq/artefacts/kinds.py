@@ -145,7 +145,7 @@ class SphereFacts(ArtefactFacts):
     form_key: ClassVar[str | None] = "form_um"
     certified_values: ClassVar[tuple[CertifiedValue, ...]] = (
         tables.DIAMETER,
-        CertifiedValue("form_um", "", tables.FORM_WORDS, needed=False),
+        CertifiedValue("form_um", "", tables.FORM_WORDS, needed=False, line="form"),
     )
 
     form_um: Uncertainty | None = key(None, "Form deviation of the sphere by its certificate.")

@@ -291,7 +291,7 @@ def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, Certif
         if (found := _certified(data, source, nameable)) is None:
             return data
         says.append(found)
-        return {**data, "artefact": found.beside(data["artefact"])}
+        return found.beside(data)
 
     model_for = partial(_model_for, nameable=nameable, path=source.toml)
     facts = checked(content, source.toml, model_for, nameable.standards, beside=beside)
@@ -315,7 +315,7 @@ def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> Ce
     if begins_with(content[:HEAD], DCC):
         from cmm_uq.jobs.recording.certified import certified  # the model of a certificate is made for who has one
 
-        return certified(content, str(source.toml.parent / name), artefact, table)
+        return certified(content, str(source.toml.parent / name), data, table)
     if table.with_references:
         return None
     problem = f"a recording of kind {kind!r} has no certified values of single points"

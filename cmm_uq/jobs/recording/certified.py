@@ -10,7 +10,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any, get_args
 
@@ -28,6 +28,7 @@ from cmm_uq.jobs.importing.format import Fact, Recognition
 from cmm_uq.jobs.importing.recording import imported_references
 from cmm_uq.jobs.tables import artefact as artefacts
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertificateFile, CertifiedValue, ReferencedFacts
+from cmm_uq.jobs.tables.conformity import LINE_KEYS
 from cmm_uq.jobs.tables.length_formula import Growing, growing_of, with_standard_uncertainty
 
 _METRES = {unit.dsi: Decimal(str(unit.si)) for unit in UNITS.values() if unit.dsi.endswith(r"\metre")}
@@ -68,18 +69,22 @@ class CertifiedValues:
     table: Mapping[str, Any]
     recognised: Recognition | None = None
     places: PointUncertainties | None = None
+    test: Mapping[str, float] = field(default_factory=dict)  # keys of ``[test_uncertainty]``
 
-    def beside(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """``[artefact]`` as job.toml has it, with what the certificate says."""
-        return {**given, **{
+    def beside(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """job.toml as it is, with what the certificate says."""
+        given = data["artefact"]
+        artefact = {**given, **{
             key: {**_table(given, key), **value} if isinstance(value, Mapping) else value
             for key, value in self.table.items()
         }}  # fmt: skip
+        test = {"test_uncertainty": {**_table(data, "test_uncertainty"), **self.test}} if self.test else {}
+        return {**data, "artefact": artefact, **test}
 
 
-def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[ArtefactFacts]) -> CertifiedValues:
+def certified(content: bytes, where: str, data: Mapping[str, Any], facts: type[ArtefactFacts]) -> CertifiedValues:
     """What the certificate of an artefact says that job.toml does not."""
-    certificate = read(content, where)
+    certificate, given = read(content, where), data["artefact"]
     table: dict[str, Any] = {"certificate": _chain(certificate, _table(given, "certificate"), where)}
     table |= _identity(certificate, given, where)
     if facts.with_references:
@@ -96,7 +101,10 @@ def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[
     sources, count = {value.key: heading(one) for value, one in values}, sum(len(one.values) for _, one in values)
     number = Fact("certificate", say("Certificate"), Verbatim(certificate.administrative.core.identifier))
     name = where.replace("\\", "/").rpartition("/")[2]
-    return CertifiedValues(table, Recognition(name, Dcc.name, Dcc.title, (number,), sources, count))
+    test: dict[str, float] = {}
+    for value, one in values:
+        test |= _of_test(value, one, _table(data, "test_uncertainty"), where)
+    return CertifiedValues(table, Recognition(name, Dcc.name, Dcc.title, (number,), sources, count), test=test)
 
 
 def _chain(certificate: Certificate, given: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -186,13 +194,31 @@ def _valued(value: CertifiedValue, quantity: QuantityFigures, given: Mapping[str
             raise _contradicted(f"[artefact] {value.key}", stated[key], table[key], where)
         table = {}
     if value.u_key:
-        us = [each.normal_u for each in quantity.uncertainties]  # none where one value has none
-        largest = [u * _METRES[unit] for u, unit in zip(us, quantity.units, strict=True) if u is not None]
-        u_um = float(max(largest) * 1_000_000) if len(largest) == len(us) else None
+        u_um = _largest_u_um(quantity)
         longest = max(numbers) if not value.micrometres else 0.0
         u_key, shown = value.u_key.rpartition(".")[2], f"[artefact] {value.u_key}"
         table |= _uncertain(u_key, u_um, stated, where, shown, quantity.shown, longest)
     return {outer: table} if outer else table
+
+
+def _largest_u_um(quantity: QuantityFigures) -> float | None:
+    """Of its values; none where one has none."""
+    us = [each.normal_u for each in quantity.uncertainties]
+    largest = [u * _METRES[unit] for u, unit in zip(us, quantity.units, strict=True) if u is not None]
+    return float(max(largest) * 1_000_000) if len(largest) == len(us) else None
+
+
+def _of_test(value: CertifiedValue, one: QuantityFigures, test: Mapping[str, Any], where: str) -> dict[str, float]:
+    """What a test value is uncertain by that the certificate says, where the job does not."""
+    u_um = _largest_u_um(one) if value.line else None
+    if not u_um:
+        return {}
+    if _table(test, "negligible").get(value.line):
+        problem = f"states a standard uncertainty of {u_um:g} µm of {one.shown}, declared negligible in job.toml"
+        fix = f"Leave {value.line} out of [test_uncertainty.negligible]"
+        raise CmmUqError(problem, where=where, fix=fix)
+    key = LINE_KEYS[value.line]
+    return _uncertain(key, u_um, test, where, f"[test_uncertainty] {key}", one.shown)
 
 
 def _uncertain(

@@ -28,7 +28,8 @@ class CertifiedValue:
     """A value of ``[artefact]`` that a digital certificate may state, and the key of its standard uncertainty, µm, if any.
 
     ``words``: parts of the names by which certificates call it, in small letters; ``count``: of values, of which the largest
-    uncertainty is taken; ``needed``: whether a certificate without it is of no use.
+    uncertainty is taken; ``needed``: whether a certificate without it is of no use; ``line``: of the test uncertainty, that
+    its own is.
     """
 
     key: str
@@ -36,6 +37,7 @@ class CertifiedValue:
     words: Sequence[str]
     count: int = 1
     needed: bool = True
+    line: str = ""
 
     @property
     def micrometres(self) -> bool:

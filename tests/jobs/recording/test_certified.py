@@ -106,6 +106,29 @@ def test_a_sphere_has_its_diameter_and_its_form() -> None:
         job("sphere", without)
 
 
+ROUND = issued(value("Diameter", "25.0012", "0.0002"), value("Form deviation", "0.00010", "0.00006"))
+"""U of the form 0.06 µm, k = 2."""
+
+
+@pytest.mark.parametrize(("test", "u", "refused"), [
+    (None, 0.03, ""), ({"u_form_um": 0.05}, 0.05, ""), ({"u_form_um": 0.03}, 0.03, ""),
+    ({"u_form_um": 0.001}, None, "u_form_um = 0.001 is smaller than the standard uncertainty 0.03 µm of"),
+    ({"negligible": {"form": {"by": "A", "reason": "B"}}}, None, "a standard uncertainty of 0.03 µm of .*Form deviation"),
+])  # fmt: skip
+def test_what_the_form_of_a_sphere_is_uncertain_by_is_read_too(
+    test: dict[str, Any] | None, u: float | None, refused: str
+) -> None:
+    """It was left out: a form declared exact, or known to a nanometre, passed beside a certificate that says otherwise."""
+    found = files("sphere", ROUND)
+    data = tomllib.loads(found["job.toml"].decode()) | ({} if test is None else {"test_uncertainty": test})
+    found["job.toml"] = tomlkit.dumps(data).encode()
+    if u is None:
+        with pytest.raises(CmmUqError, match=refused):
+            job_of(found)
+    else:
+        assert job_of(found).facts.test_uncertainty.u_form_um == pytest.approx(u)
+
+
 def test_a_triangle_has_its_blocks_and_cylinders_with_the_largest_uncertainty_of_each() -> None:
     artefact = job("triangle", TRIANGLE).facts.artefact
     assert artefact.model_dump(include=set(STATED["triangle"])) == {
