@@ -256,12 +256,11 @@ def show_recognised(recognised: Recognition) -> None:
     show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
 
 
-def show_proposed(recognised: Recognition, example: str, names: Iterable[str]) -> None:
+def show_proposed(recognised: Recognition, example: str, places: Mapping[str, tuple[str, str]]) -> None:
     """How lengths were read, and the question where their lines lie, as options of the command."""
-    from cmm_uq.jobs.importing.lines import place_named
-
     show_recognised(recognised)
-    lines = (f'--line "{name}={next(filter(None, place_named(name)))}"' for name in names)
+    asked = {name: own[0] or own[1] for name, own in places.items() if not own[0] or "?" in own[0]}
+    lines = (f'--line "{name}={place}"' for name, place in asked.items())
     say(f"Read as: {example}")
     say(f"Where they lie: {' '.join(lines)}, or --plan plan.csv where they were planned")
 

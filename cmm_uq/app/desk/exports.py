@@ -11,14 +11,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.app.commands.jobs.exchange import lines_asked, placed_by_plan, remember, remembered_keys
+from cmm_uq.app.commands.jobs.exchange import lines_asked, placed_by_plan, proposed, remember, remembered_keys
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.importing.answers import matching, path_of
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Recognition, Sheet, letters, sources_of
 from cmm_uq.jobs.importing.header import NAME, Header, text_of, understood
-from cmm_uq.jobs.importing.lines import place_named
 from cmm_uq.jobs.importing.recording import example, imported, points_of, tables_in
 from cmm_uq.jobs.importing.roles import said as role_said
 
@@ -63,7 +62,7 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
         "name": name,
         "command": command(name, said),
         "problem": None,
-        "lines": [],
+        "lines": {},
         "example": "",
         "facts": [],
     }
@@ -72,12 +71,12 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
         table = imported(content, name, said)
         points_of(table.columns, table.lines.tolist(), name, Machine())
         recognised, found["example"] = table.recognised, example(table)
-        found["lines"] = list(said.lines)
+        found["lines"] = {line: proposed(place) for line, place in table.places.items()}
     except CmmUqError as error:
         if (asked := lines_asked(error)) is not None:
             recognised, found["example"], found["lines"] = asked
         found["problem"] = [error.where or "", error.problem, error.fix or ""]
-    found["lines"] = [(name, *place_named(name)) for name in found["lines"]]
+    found["lines"] = [(line, *own) for line, own in found["lines"].items()]
     try:
         sheets, tables = tables_in(content, name, said)
     except CmmUqError:  # it is told already why nothing is read

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -28,7 +28,8 @@ from cmm_uq.jobs.importing.format import (
     sources_of,
     unit_named,
 )
-from cmm_uq.jobs.importing.header import named_alike, plain_words, without_unit, words_of
+from cmm_uq.jobs.importing.header import named_alike, without_unit
+from cmm_uq.jobs.importing.lengths.places import END, START, role_among, said_in, without_place
 
 _FIGURE = re.compile(r"[±<>≤≥~]?\s*([+-]?\d[\d .,'’]*|[+-]?[.,]\d+)(?:[eE][+-]?\d+)?")
 _GROUPS = {sign: re.compile(rf"(?<=\d)[{other} '’](?=\d{{3}})") for sign, other in ((",", "."), (".", ","))}
@@ -39,14 +40,12 @@ _PRINTED = re.compile(r"\d[.,]\d")
 _DECIMAL = re.compile(r"^[^\d]*\d+[.,]\d+\D*$")
 _SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*(\w+)", re.IGNORECASE)
 _MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
-_BETWEEN = r"[\s;,]+(?:[YZ]\s*[=:]?\s*)?"
-_PLACE = r"([+−-]?\d+(?:[SIGN]\d+)?)"
-_THREE = {s: re.compile(r"[^\d+−-]{0,20}?" + _BETWEEN.join([_PLACE] * 3).replace("SIGN", s), re.I) for s in ".,"}
 _FORMULA = re.compile(r"(?<=\S)\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
-_AXIS_LETTER = re.compile(r"\b[XYZ]\b")
+_AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012]?(?![^\W_]))", re.IGNORECASE)
+_ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?0(?!\w)")
 _MEASURED = 0.05  # figures printed finer are no planned places
 _POWER = 99  # of ten, beyond which a text is no figure
 WORD = re.compile(r"[^\W\d_]+")
@@ -104,11 +103,10 @@ class CutSheet:
         self.width = max(map(len, sheet.rows), default=0)
         self.figures = [[None if c == "" else figure(c, self.sign) for c in row] for row in sheet.rows]
         self.matched: set[str] = set()  # of what the job calls columns, what is there
-        self.places_of: dict[int, str] = {}  # of each row of figures, as LINE_PLACE has it
+        self.above: dict[int, list[str]] = {}  # of each row of figures, the title of its line and what follows it
+        self._columns: dict[int, dict[str, list[int]]] = {}  # of coordinates of lines, by block
         self.blocks = self._titled(list(self._blocks()))
         self.block_of = {row: block for block in self.blocks for row in block.rows}
-        for block in self.blocks:
-            self.places_of |= self._places_beside(block)
         self.ends = {row for block in self.blocks for row in block.rows[named_alike(self.sheet.rows, block.rows) :]}
 
     def at(self, row: int, i: int | None = None) -> str:
@@ -132,9 +130,9 @@ class CutSheet:
         own = [self.figure(row, i) or (np.nan, 0.0) for row in rows]
         return np.array([value for value, _ in own]), np.array([step for _, step in own])
 
-    def place(self, i: int) -> dict[str, tuple[float, ...]]:
-        """Start, end and direction of a line, where a row gives three figures after a word for one of them."""
-        return places_in(self.line(i), self.sign)
+    def place(self, i: int) -> bool:
+        """Whether a row says the place of a line."""
+        return said_in([self.line(i)], self.sign).whole
 
     def line(self, row: int) -> str:
         return " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
@@ -172,6 +170,13 @@ class CutSheet:
         """Texts above a cell."""
         return self.block_of[row].paths[i] if row in self.block_of else []
 
+    def _place_within(self, i: int, numbers: Sequence[int], beside: Sequence[Sequence[int]]) -> bool:
+        """Whether figures of a row are of the place of a line, and no text of it alone says that."""
+        if (len(numbers) not in (1, 2, 3, 6) and numbers in beside) or not self.place(i):
+            return False
+        texts = [self.text(i, k) for k in range(len(self.figures[i])) if k not in numbers]
+        return not said_in(texts, self.sign).whole
+
     def _is_head(self, i: int) -> bool:
         """Whether a row with figures counts columns, as ``1 2 3 1 2 3``."""
         own = [f for f in self.figures[i] if f is not None]
@@ -190,8 +195,7 @@ class CutSheet:
         numbers = [k for k in filled if self.figures[i][k] is not None]
         around = [self.figures[j] for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
         beside = [[k for k, f in enumerate(own) if f is not None] for own in around]
-        coordinates = len(numbers) in (1, 2, 3, 6)  # of one place or two
-        if not numbers or (self.place(i) and (coordinates or numbers not in beside)):
+        if not numbers or self._place_within(i, numbers, beside):
             return "text"
         counted = len(filled) == 2 and numbers == filled[1:] and (self.figures[i][filled[1]] or (0, 0))[1] >= 1
         if counted and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN):
@@ -210,6 +214,7 @@ class CutSheet:
     def _blocks(self) -> Iterator[Block]:
         pending: list[int] = []
         titles: dict[str, str] = {}
+        last: list[str] = []
         block: Block | None = None
         self.kinds = [self._kind(i) for i in range(len(self.sheet.rows))]
         self._ruled = {self.sheet.lines[i] for i, kind in enumerate(self.kinds) if kind == "rule"}
@@ -235,10 +240,12 @@ class CutSheet:
             block.above += above
             block.rows.append(i)
             block.titles[i] = titles
-            place = {name: xyz for row in block.above for name, xyz in self.place(row).items()}
-            if "start" in place and len(place) > 1:
-                other = "end" if "end" in place else "direction"
-                self.places_of[i] = f" {other} ".join(",".join(map(repr, place[one])) for one in ("start", other))
+            if above:
+                lined = [k for k, row in enumerate(above) if hint(self.line(row), lengths=True) == LINE]
+                told = [self.line(row) for row in above[lined[-1] if lined else max(0, len(above) - DEEPEST) :]]
+                told = told if lined or any(hint(text, lengths=True) != RUN for text in told) else last
+                last = told
+            self.above[i] = last
         if block is not None:
             yield block
 
@@ -259,51 +266,65 @@ class CutSheet:
                 block.paths = self._paths(block.head)
         return blocks
 
-    def _places_beside(self, block: Block) -> dict[int, str]:
-        """Places of lines in columns beside lengths, once for the rows that follow: by words, else below X, Y, Z twice."""
-        columns: dict[str, list[int]] = {"start": []}
-        for i, path in enumerate(block.paths):
-            if any(self.figure(row, i) for row in block.rows):
-                for name in [name for _, name in _named_places(" ".join(path))][:1]:
-                    columns.setdefault(name, []).append(i)
-        other = next((name for name in ("end", "direction") if len(columns.get(name, ())) == 3), "")
-        if other and len(columns["start"]) == 3:
-            return self._filled_places(block, (*columns["start"], *columns[other]), other)
-        last = [path[-1].strip().upper() if path else "" for path in block.paths]
-        for i, text in enumerate(last):
-            if last[i + 1 : i + 3] == ["", ""] and "".join(_AXIS_LETTER.findall(text)) == "XYZ":
-                last[i : i + 3] = "XYZ"  # one head over three
-        axes = [*enumerate(last)]
-        six = [i for i, text in axes if len(text) == 1 and text in "XYZ"]
-        fine = any((self.figure(row, i) or (0, 1))[1] < _MEASURED for row in block.rows for i in six)
-        if fine or "".join(text for i, text in axes if i in six) != "XYZXYZ":
-            return {}  # or measured balls
-        found = self._filled_places(block, six, "end")
-        return found if any(self._as_far(found, i) for i in range(self.width) if i not in six) else {}
+    def _place_columns(self, block: Block) -> dict[str, list[int]]:
+        """Columns of the coordinates of starts, ends or directions beside lengths: by words, else X, Y and Z twice."""
+        heads = [
+            (i, " ".join(path)) for i, path in enumerate(block.paths) if any(self.figure(r, i) for r in block.rows)
+        ]
+        columns: dict[str, list[int]] = {}
+        for i, text in heads:
+            columns.setdefault(START if _ORIGIN.search(text) else role_among(text), []).append(i)
+        by_words = {role: own for role, own in columns.items() if role and len(own) == 3}
+        if START in by_words and len(by_words) > 1:
+            return by_words
+        last = [path[-1].strip() if path else "" for path in block.paths]
+        axes = ["".join(_AXIS_LETTER.findall(text)).upper() for text in last]
+        for i, text in enumerate(axes):
+            if last[i + 1 : i + 3] == ["", ""] and text == "XYZ":
+                axes[i : i + 3] = "XYZ"  # one head over three
+        six = [(i, axes[i]) for i, _ in heads if len(axes[i]) == 1]
+        fine = any((self.figure(row, i) or (0, 1))[1] < _MEASURED for row in block.rows for i, _ in six)
+        if fine or "".join(axis for _, axis in six) != "XYZXYZ":
+            return by_words  # or measured balls
+        found = {START: [i for i, _ in six[:3]], END: [i for i, _ in six[3:]]}
+        return (
+            found if any(self._as_far(block, found, i) for i in range(self.width) if i not in dict(six)) else by_words
+        )
 
-    def _filled_places(self, block: Block, six: Sequence[int], other: str) -> dict[int, str]:
-        found, last = dict[int, str](), ""
-        for row in block.rows:
-            own = [repr(figure[0]) for figure in (self.figure(row, i) for i in six) if figure]
-            last = f"{','.join(own[:3])} {other} {','.join(own[3:])}" if len(own) == 6 else last
-            found |= {row: last} if last else {}
-        return found
-
-    def _as_far(self, places: Mapping[int, str], i: int) -> bool:
+    def _as_far(self, block: Block, columns: Mapping[str, Sequence[int]], i: int) -> bool:
         """Whether starts and ends are as far apart as the longest of the lengths in a column that were measured there."""
-        longest: dict[str, float] = {}
-        for row, place in places.items():
-            longest[place] = max(longest.get(place, 0.0), (self.figure(row, i) or (0.0,))[0])
-        far = {place: np.array([float(one) for one in place.replace(" end ", ",").split(",")]) for place in longest}
-        apart = {place: float(np.linalg.norm(own[3:] - own[:3])) for place, own in far.items()}
-        return bool(far) and all(0.3 * apart[place] < own <= 1.02 * apart[place] + 1 for place, own in longest.items())
+        longest: dict[float, float] = {}
+        for row in block.rows:
+            ends = [(self.figure(row, k) or (np.nan,))[0] for one in (START, END) for k in columns[one]]
+            apart = float(np.linalg.norm(np.subtract(ends[3:], ends[:3])))
+            if np.isfinite(apart):
+                longest[apart] = max(longest.get(apart, 0.0), (self.figure(row, i) or (0.0,))[0])
+        return bool(longest) and all(0.3 * apart < own <= 1.02 * apart + 1 for apart, own in longest.items())
+
+    def says(self, row: int) -> tuple[str, ...]:
+        """What may say where the line of a row lies: titles above it, texts beside it, columns of starts and ends."""
+        block, texts = self.block_of[row], [*self.above.get(row, ())]
+        if (columns := self._columns.get(block.number)) is None:
+            columns = self._columns[block.number] = self._place_columns(block)
+        for i, own in enumerate(self.figures[row]):
+            if own is None and (text := self.text(row, i)):
+                role = role_among(heading(block.paths[i]) if i < len(block.paths) else "")
+                texts.append(f"{role} {text}" if role in (START, END) else text)
+        for role, three in columns.items():
+            values = [f"{f[0]:.10g}" for f in (self.figure(row, i) for i in three) if f]
+            texts += [f"{role} ({'; '.join(values)})"] if len(values) == 3 else []
+        return tuple(texts)
+
+    def placed(self, rows: Iterable[int]) -> bool:
+        """Whether all rows say where their lines lie."""
+        return all(said_in(self.says(row), self.sign).whole for row in rows)
 
     def _titles(self, row: int) -> dict[str, str]:
         """Titles in a row of text, by the word that each begins with; without one where it has nothing else."""
         cells = [str(cell) for cell in self.sheet.rows[row] if cell != ""]
         text = self.line(row)
-        if placed := bool(self.place(row)):
-            text = text[: next(_named_places(text))[0].start()].strip()
+        if placed := self.place(row):
+            text = without_place(text, self.sign)
         pairs = _PAIRS.split(text)
         parts = pairs if all(":" in pair for pair in pairs) else [text]
         parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
@@ -353,23 +374,6 @@ class CutSheet:
 def _begun(word: str) -> str:
     """How a title begins; all letters of axes alike."""
     return word.casefold() if len(word) > 1 or not word.isascii() else "x"
-
-
-def _named_places(text: str) -> Iterator[tuple[re.Match[str], str]]:
-    """Words for the start, the end or the direction of a line, and which of them they are."""
-    for match in WORD.finditer(text):
-        word = " ".join(plain_words(match[0]))
-        if len(word) > 2 or not word.isascii():
-            yield from ((match, name) for name, those in words_of("places").items() if word in those)
-
-
-def places_in(text: str, sign: str) -> dict[str, tuple[float, ...]]:
-    """Start, end and direction of a line that a text gives, three figures after a word for each."""
-    found = {}
-    for match, name in _named_places(text) if sum(map(str.isdigit, text)) > 2 else ():
-        if three := _THREE[sign].match(text, match.end()):
-            found[name] = tuple(float(figure.replace("−", "-").replace(",", ".")) for figure in three.groups())
-    return found
 
 
 def unit_of(path: Sequence[str]) -> WrittenUnit | None:

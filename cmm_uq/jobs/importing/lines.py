@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -67,6 +67,8 @@ class MeasuredLengths:
     sources: dict[str, str]
     facts: tuple[Fact, ...]
     left_out: tuple[str, ...]
+    places: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """By line, as the file says it, with ? for what it leaves open, and its words."""
 
 
 def placed(
@@ -74,7 +76,9 @@ def placed(
 ) -> tuple[dict[str, NDArray[Any]], tuple[Fact, ...], list[int]]:
     """Columns of a recording, (2n,): both ends of every length, where the job says that its line lies; lines of the file."""
     wanted = list(dict.fromkeys(table.names))
-    if lacking := [name for name in wanted if name not in keys.lines]:
+    by_file = {name: own for name, own in table.places.items() if "?" not in own[0] and name not in keys.lines}
+    places = {**keys.lines, **{name: place for name, (place, _) in by_file.items()}}
+    if lacking := [name for name in wanted if name not in places]:
         lie = f"lines {', '.join(map(repr, lacking))} lie" if len(lacking) > 1 else f"line {lacking[0]!r} lies"
         fix = f'Say it, with its start in mm: lines = {{ "{lacking[0]}" = "along X from 100,200,300" }}'
         raise CmmUqError(f"nothing says where {lie}, along which lengths were measured", where=where, fix=fix)
@@ -88,7 +92,7 @@ def placed(
     number: dict[tuple[str, float | None], int] = {}
     keyed = zip(table.names, table.reference, strict=True)
     measurements = [number.setdefault(key, len(number) + 1) for key in keyed]
-    lines = [place_of(keys.lines[name]) for name in table.names]
+    lines = [place_of(places[name]) for name in table.names]
     start, way = (np.array([line[k] for line in lines]) for k in (0, 1))
     xyz = np.stack([start, start + np.array(table.measured)[:, None] * way], axis=1).reshape(-1, 3)
     columns = {
@@ -98,7 +102,17 @@ def placed(
     if not all(bare):
         columns[REFERENCE] = np.array([[0.0, reference] for reference in table.reference], dtype=np.float64).ravel()
     columns |= {name: np.repeat(values, 2) for name, values in table.beside.items()}
-    told = [say("{name}: {place}", name=Verbatim(name), place=Verbatim(keys.lines[name])) for name in wanted]
+    told = [
+        say(
+            "{name}: {place}, as the file says: {words}",
+            name=Verbatim(name),
+            place=Verbatim(by_file[name][0]),
+            words=Verbatim(by_file[name][1]),
+        )
+        if name in by_file
+        else say("{name}: {place}", name=Verbatim(name), place=Verbatim(places[name]))
+        for name in wanted
+    ]
     return columns, (Fact("lines", say("Lines"), semicolons(told)),), [line for line in table.lines for _ in range(2)]
 
 
@@ -299,28 +313,3 @@ def _axis_of(sheets: Sequence[Sheet]) -> str:
     """The axis that the first texts of a file name."""
     texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
     return next(filter(None, map(axis_in, texts)), "1")
-
-
-_FIGURE = r"\s*([-−]?\d+(?:\.\d+)?)\s*"
-_CORNER = re.compile(rf"\({_FIGURE}[/;,|]{_FIGURE}[/;,|]{_FIGURE}\)")
-_ALONG = re.compile(r"(?<![A-Za-z+−-])([XYZ]+)(?![A-Za-z\d]|\s*[=:\d])")
-_ACROSS = re.compile(rf"(?:[XYZ]\s*[=:]|(?<=[(/,;])\s*[XYZ]\s){_FIGURE}", re.I)
-
-
-def place_named(name: str) -> tuple[str, str]:
-    """What the name of a line says of its place, with ? for what it leaves open, empty where it says none; and an example.
-
-    Examples
-    --------
-    >>> place_named("Lage 1: (0/0/0) → (900/1600/800)")[0], place_named("parallel X (Y 800 / Z 400)")[0], place_named("Y axis")
-    ('from 0,0,0 to 900,1600,800', 'along X from ?,800,400', ('', 'along Y from 100,200,300'))
-    """
-    corners = [",".join(found.groups()).replace("−", "-") for found in _CORNER.finditer(name)]
-    along = _ALONG.findall(name)
-    axis = along[0] if len(along) == 1 and len(along[0]) == 1 else ""
-    across = {found[0].strip(" (/,;")[0].upper(): found[1].replace("−", "-") for found in _ACROSS.finditer(name)}
-    known = ["?" if one == axis else across.get(one, "?") for one in "XYZ"]
-    place = f"along {axis} from {','.join(known)}" if axis and {*known} != {"?"} else ""
-    if len(corners) == 2 and corners[0] != corners[1]:
-        place = f"from {corners[0]} to {corners[1]}"
-    return place, f"along {axis or 'X'} from 100,200,300"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import compress
 from pathlib import PurePath
@@ -153,6 +153,7 @@ class ImportedTable:
     columns: dict[str, Floats]
     lines: Ints
     recognised: Recognition
+    places: Mapping[str, str] = field(default_factory=dict)  # of lines of lengths, and of axes, by name
 
 
 class UnplacedError(CmmUqError):
@@ -227,20 +228,21 @@ def _understood(
         header = header_of(sheet, keys.model_copy(update={"columns": {}}), where, POINTS)
         assert header is not None  # of the head that was written  # noqa: S101
         return _points(sheet, header, keys, where, reach_mm, begun, points=True)
-    lines = reading.lines
+    lines, places = reading.lines, dict[str, str]()
     if reading.kind == "points":
         columns, facts = understood.points(keys, where, reach_mm)
     else:
         lengths = understood.lengths(keys, where, reach_mm)
-        keys, facts = keys.model_copy(update={"lines": {**understood.places, **keys.lines}}), lengths.facts
+        facts = lengths.facts
         try:
             columns, of_lines, lines = placed(lengths, keys, where)
+            places = {name: place for name, (place, _) in lengths.places.items()} | keys.lines
         except CmmUqError as error:
             found = replace(begun, facts=facts, columns=lengths.sources, points=2 * len(lengths.names))
             raise UnplacedError(error, found, [lengths]) from None
         facts += of_lines
     found = replace(begun, facts=facts, columns=understood.sources, points=len(lines))
-    return ImportedTable(columns, np.array(lines), found)
+    return ImportedTable(columns, np.array(lines), found, places)
 
 
 def _alternatives(form: Format, content: bytes, where: str, keys: ImportKeys) -> Iterator[Sequence[Sheet]]:

@@ -24,10 +24,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import lines_within
 from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS, UNPACKED
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.jobs.importing.blocks import places_in
 from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
 from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
+from cmm_uq.jobs.importing.lengths.places import said_in
 from cmm_uq.jobs.importing.reports import in_pairs
 from cmm_uq.jobs.importing.roles import said
 
@@ -174,7 +174,7 @@ def _is_row(texts: Sequence[str], line: str) -> bool:
     n, printed = sum(numbers), any(_POINT.search(text) for text in texts)
     if 2 * n < len(texts) or not (n > 1 or (len(texts) <= 3 and n and printed)):
         return False
-    if n > 2 and any(places_in(line, sign) for sign in ".,"):
+    if n > 2 and any(said_in([line], sign).whole for sign in ".,"):
         return False
     apart = n > 1 and not any(a and b for a, b in pairwise(numbers))
     return not apart or (numbers[0] and any(_POINT.search(text) for text in compress(texts, numbers)))

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
@@ -26,10 +26,11 @@ from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_ax
 from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import places
-from cmm_uq.jobs.importing.header import Header, is_summary
+from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary
 from cmm_uq.jobs.importing.lengths.evidence import sums_of
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lines_and_runs
+from cmm_uq.jobs.importing.lengths.places import says_figures, stated_places
 from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import MeasuredLengths, axis_in
@@ -37,7 +38,6 @@ from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, rows_left_out, said_by
 
 _COMPARED = 5000  # points of sheets
-_SAME_MM, _OFF_MM = 1e-4, 0.1  # of places of one line, rounded
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+")
 Found = tuple[SheetReading, CutSheet]
@@ -93,18 +93,18 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     if not chosen or (chosen[0][0].kind == "points" and not counted):
         return None
     _refuse_unmatched([grid for _, grid in chosen], keys, where)
-    elsewhere: Mapping[str, str] = {}
+    elsewhere: list[tuple[str, str]] = []
     if chosen[0][0].kind == "lengths":
         _refuse_same_lines(chosen, where)
-        elsewhere = _tabled_places(upright, of)
+        elsewhere = _said_elsewhere(upright, chosen)
     left_out: list[str] = []
     _take_results(found, chosen)
     for grid in {id(own): own for _, own in chosen}.values():
         if (told := rows_left_out([reading for reading, own in chosen if own is grid], grid)) is None:
             return None
         left_out += told
-    _label(chosen, elsewhere)
-    return Understanding(joined([reading for reading, _ in chosen]), sheets, left_out, chosen[0][1])
+    _label(chosen)
+    return Understanding(joined([reading for reading, _ in chosen]), sheets, left_out, chosen[0][1], elsewhere)
 
 
 def _take_results(found: Sequence[Found], chosen: Sequence[Found]) -> None:
@@ -137,14 +137,12 @@ def _ways_of(sheet: Sheet, keys: Mapping[str, Sources], where: str) -> Iterator[
             yield CutSheet(other, keys, where), True
 
 
-def _label(chosen: Sequence[Found], elsewhere: Mapping[str, str]) -> None:
-    """Sheet of every observation, and where its line lies by its own sheet, else by its name in another."""
+def _label(chosen: Sequence[Found]) -> None:
+    """Sheet of every observation, and what may say where its line lies."""
     for reading, grid in chosen:
         for labels, row in zip(reading.labels, reading.rows, strict=True):
-            named = {elsewhere[text] for text in labels.values() if text in elsewhere}
-            place = grid.places_of.get(row) or (named.pop() if len(named) == 1 else "")
             labels["sheet", ""] = grid.sheet.name
-            labels |= {("place", ""): place} if place else {}
+            labels["place", ""] = "\n".join((grid.sheet.name, *grid.says(row)))
 
 
 def _chosen(found: Sequence[Found]) -> list[Found]:
@@ -190,13 +188,16 @@ def _refuse_same_lines(chosen: Sequence[Found], where: str) -> None:
         raise NotReadError(what, where=where, fix=f'Say which: sheet = "{first}"')
 
 
-def _tabled_places(sheets: Sequence[Sheet], others: Collection[str]) -> dict[str, str]:
-    """Places of lines by their names, of sheets that have a row for each; of a name with two places neither."""
-    found: dict[str, set[str]] = {}
-    for grid in (CutSheet(sheet) for sheet in sheets if sheet.name not in others):
-        for row, place in grid.places_of.items():
-            found.setdefault(grid.text(row, 0), set()).add(place)
-    return {name: places.pop() for name, places in found.items() if len(places) == 1}
+def _said_elsewhere(sheets: Sequence[Sheet], chosen: Sequence[Found]) -> list[tuple[str, str]]:
+    """Rows that are not read and may say where lines lie, each with the text in its first cell."""
+    taken = {(grid.sheet.name, line) for reading, grid in chosen for line in reading.lines}
+    found = []
+    for grid in map(CutSheet, sheets):
+        for row in range(min(len(grid.sheet.rows), LINES_BEFORE)):
+            if (grid.sheet.name, grid.sheet.lines[row]) not in taken:
+                texts = grid.says(row) if row in grid.block_of else [grid.line(row)]
+                found.append((grid.text(row, 0), "\n".join(texts)))
+    return [(name, text) for name, text in found if says_figures(text)]
 
 
 def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
@@ -210,7 +211,7 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         readings: list[SheetReading] = []
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
-        for read in (lengths + places if {*own} <= {*grid.places_of} else places + lengths) if own else ():
+        for read in (lengths + places if grid.placed(own) else places + lengths) if own else ():
             try:
                 reading = read(grid, blocks, own)
             except EitherError as error:
@@ -258,7 +259,7 @@ class Understanding:
     sheets: Sequence[Sheet]
     left_out: list[str]
     grid: CutSheet
-    places: dict[str, str] = field(default_factory=dict)  # of lines, where the file says them
+    elsewhere: Sequence[tuple[str, str]] = ()  # rows that may say where lines lie, each with the text in its first cell
 
     @property
     def confirmed(self) -> tuple[int, int]:
@@ -321,11 +322,12 @@ class Understanding:
                 what = f"nothing says the unit of {bare[0].heading!r}: µm or mm"
                 raise NotReadError(what, where=place, fix=said_by("deviation_um", bare, ", or deviation_mm"))
             measured = reference + formats.converted(figures[:, 1], small, "length_mm")
-        self.places = _places(lines, own, measured, unit)
+        stated = [one["place", ""] for one in own.labels]
+        places = stated_places(lines, stated, self.elsewhere, measured.tolist(), unit.up / unit.down, self.grid.sign)
         bare_ = [None if np.isnan(one) else float(one) for one in reference]
         return MeasuredLengths(
             *(lines, bare_, runs.tolist(), measured.tolist(), own.lines, own.covariates, self.sources),
-            *(self.facts(of_unit, used), tuple(self.left_out)),
+            *(self.facts(of_unit, used), tuple(self.left_out), places),
         )
 
     def points(
@@ -345,36 +347,6 @@ class Understanding:
         used = [label.words.strip() for label in labels if len({*label.values}) > 1 and label.sort != "block"]
         columns = {**numbers, **dict(zip(COORDINATES, xyz.T, strict=True)), **further}
         return columns, (*self.facts(of_unit, used), *facts)
-
-
-def _places(names: Sequence[str], reading: SheetReading, measured: Floats, unit: WrittenUnit) -> dict[str, str]:
-    """Where lines lie, by the starts and ends that stand above them, which must be as far apart as their lengths need."""
-    places = {}
-    for name in dict.fromkeys(names):
-        own = [k for k, one in enumerate(names) if one == name]
-        stated = {reading.labels[k].get(("place", ""), "") for k in own}
-        parted = [text.split() for text in stated if text]
-        each = [np.array([[float(one) for one in part.split(",")] for part in (p[0], p[2])]) for p in parted]
-        ways = [ends[1] - ends[0] if parts[1] == "end" else ends[1] for parts, ends in zip(parted, each, strict=True)]
-        ways = [way / max(np.linalg.norm(way), 1e-9) for way in ways]
-        if not each or len(each) < len(stated):
-            continue
-        far = max(range(len(each)), key=lambda k: float(np.linalg.norm(each[k][1] - each[k][0])))
-        reach = [
-            own[1] - own[0] if parts[1] == "end" else own[1] * _OFF_MM / _SAME_MM
-            for own, parts in zip(each, parted, strict=True)
-        ]
-        off = [float(np.linalg.norm(np.cross(ways[far], one))) for one in reach]
-        if any(np.abs(one[0] - each[0][0]).max() > _SAME_MM for one in each) or max(off) > _OFF_MM:
-            continue
-        ends, which = each[far], parted[far]
-        longest = measured[own].max()
-        if which[1] == "direction":
-            ends[1] = ends[0] + ways[0] * longest * unit.down / unit.up
-        ends = formats.converted(ends, unit, "x_mm")
-        if longest * 0.98 - 1 <= np.linalg.norm(ends[1] - ends[0]) <= 3 * longest:
-            places[name] = "from " + " to ".join(",".join(f"{one:.10g}" for one in end) for end in ends)
-    return places
 
 
 def _refuse_either_sign(grid: CutSheet) -> None:

@@ -135,8 +135,6 @@ def test_a_row_whose_text_says_where_it_lies_is_measured_as_those_beside_it() ->
         for nominal in (49.9998, 124.9999, 250.0002, 375.0003)
     ]  # fmt: skip
     head = ["Ligne;Emplacement;Longueur étalonnée;Mesure 1;Mesure 2;Mesure 3", ";;mm;mm;mm;mm"]
-    with pytest.raises(UnplacedError) as unplaced:
-        imported("\n".join([*head, *rows, ""]).encode(), "e0.csv", ImportKeys())
-    (found,) = unplaced.value.lengths
-    assert len(found.measured) == 3 * len(rows)
-    assert {*found.names} == {"X", "D1"}
+    found = imported("\n".join([*head, *rows, ""]).encode(), "e0.csv", ImportKeys())
+    assert len(found.lines) == 2 * 3 * len(rows)
+    assert found.places == {"X": "along X from 100,400,300", "D1": "from 100,100,50 to 700,700,550"}

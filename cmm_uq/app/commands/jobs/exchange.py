@@ -21,6 +21,7 @@ from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.importing.answers import as_file, folder, matching, path_of
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
+from cmm_uq.jobs.importing.lengths.places import proposed as proposed
 from cmm_uq.jobs.importing.recording import (
     ImportedTable,
     UnplacedError,
@@ -64,12 +65,16 @@ def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
     return found
 
 
-def lines_asked(error: CmmUqError) -> tuple[Recognition, str, list[str]] | None:
-    """How lengths were read of which nothing says where they lie: the reading, its first in words, the lines by name."""
+def lines_asked(error: CmmUqError) -> tuple[Recognition, str, dict[str, tuple[str, str]]] | None:
+    """How lengths were read of which nothing says where they lie: the reading, its first in words, the lines by name.
+
+    Of each line its place as far as the file says it, with ? for what it leaves open, and an example of one.
+    """
     if not isinstance(error, UnplacedError):
         return None
-    every = [name for one in error.lengths for name in one.names]
-    return error.recognised, example(error.lengths), list(dict.fromkeys(every))
+    places = {name: place for one in error.lengths for name, (place, _) in one.places.items()}
+    every = dict.fromkeys(name for one in error.lengths for name in one.names)
+    return error.recognised, example(error.lengths), {name: proposed(places.get(name, "")) for name in every}
 
 
 def placed_by_plan(export: Path, keys: ImportKeys, plan: Path) -> ImportKeys:
