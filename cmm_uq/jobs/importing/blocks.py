@@ -294,9 +294,11 @@ class CutSheet:
     def _as_far(self, block: Block, columns: Mapping[str, Sequence[int]], i: int) -> bool:
         """Whether starts and ends are as far apart as the longest of the lengths in a column that were measured there."""
         longest: dict[float, float] = {}
+        apart = np.nan
         for row in block.rows:
             ends = [(self.figure(row, k) or (np.nan,))[0] for one in (START, END) for k in columns[one]]
-            apart = float(np.linalg.norm(np.subtract(ends[3:], ends[:3])))
+            own = float(np.linalg.norm(np.subtract(ends[3:], ends[:3])))
+            apart = own if np.isfinite(own) else apart  # where a line is named once
             if np.isfinite(apart):
                 longest[apart] = max(longest.get(apart, 0.0), (self.figure(row, i) or (0.0,))[0])
         return bool(longest) and all(0.3 * apart < own <= 1.02 * apart + 1 for apart, own in longest.items())

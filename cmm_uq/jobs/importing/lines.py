@@ -10,7 +10,7 @@ Data:`` the numbers of run and target with the deviation in µm, actual less tar
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,12 +46,17 @@ from cmm_uq.jobs.importing.format import (
     sheets_of,
 )
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
+from cmm_uq.jobs.importing.lengths.places import place_of_axis
 from cmm_uq.jobs.importing.reports import TextReport
 from cmm_uq.jobs.importing.roles import SheetReading
 
 REFERENCE = "reference_mm"
 COLUMNS = ("line", "length_mm", "nominal_mm", "deviation_um", "deviation_mm", REFERENCE, "repeat")
 """Columns of a table of lengths, which a job may name."""
+
+
+Stated = Mapping[str, tuple[str, str]]
+"""Places of lines by name, as a file says them, with ? for what it leaves open, and its words."""
 
 
 @dataclass
@@ -67,8 +72,7 @@ class MeasuredLengths:
     sources: dict[str, str]
     facts: tuple[Fact, ...]
     left_out: tuple[str, ...]
-    places: dict[str, tuple[str, str]] = field(default_factory=dict)
-    """By line, as the file says it, with ? for what it leaves open, and its words."""
+    places: Stated = field(default_factory=dict)
 
 
 def placed(
@@ -76,8 +80,8 @@ def placed(
 ) -> tuple[dict[str, NDArray[Any]], tuple[Fact, ...], list[int]]:
     """Columns of a recording, (2n,): both ends of every length, where the job says that its line lies; lines of the file."""
     wanted = list(dict.fromkeys(table.names))
-    by_file = {name: own for name, own in table.places.items() if "?" not in own[0] and name not in keys.lines}
-    places = {**keys.lines, **{name: place for name, (place, _) in by_file.items()}}
+    by_file = {name: own for name, own in table.places.items() if "?" not in own[0]}
+    places = {**{name: place for name, (place, _) in by_file.items()}, **keys.lines}
     if lacking := [name for name in wanted if name not in places]:
         lie = f"lines {', '.join(map(repr, lacking))} lie" if len(lacking) > 1 else f"line {lacking[0]!r} lies"
         fix = f'Say it, with its start in mm: lines = {{ "{lacking[0]}" = "along X from 100,200,300" }}'
@@ -102,18 +106,20 @@ def placed(
     if not all(bare):
         columns[REFERENCE] = np.array([[0.0, reference] for reference in table.reference], dtype=np.float64).ravel()
     columns |= {name: np.repeat(values, 2) for name, values in table.beside.items()}
+    return columns, (_told(wanted, places, by_file),), [line for line in table.lines for _ in range(2)]
+
+
+def _told(names: Sequence[str], places: Mapping[str, str], by_file: Stated) -> Fact:
+    """Where lines lie, of those that the file places with its words."""
+    words = {name: by_file[name][1] for name in names if by_file.get(name, ("",))[0] == places[name]}
+    shown = {name: {"name": Verbatim(name), "place": Verbatim(places[name])} for name in names}
     told = [
-        say(
-            "{name}: {place}, as the file says: {words}",
-            name=Verbatim(name),
-            place=Verbatim(by_file[name][0]),
-            words=Verbatim(by_file[name][1]),
-        )
-        if name in by_file
-        else say("{name}: {place}", name=Verbatim(name), place=Verbatim(places[name]))
-        for name in wanted
+        say("{name}: {place}, as the file says: {words}", **shown[name], words=Verbatim(words[name]))
+        if name in words
+        else say("{name}: {place}", **shown[name])
+        for name in names
     ]
-    return columns, (Fact("lines", say("Lines"), semicolons(told)),), [line for line in table.lines for _ in range(2)]
+    return Fact("lines", say("Lines"), semicolons(told))
 
 
 def place_of(text: str) -> tuple[Floats, Floats]:
@@ -153,23 +159,28 @@ class AxisRun:
     targets: list[tuple[float, float, int]]
 
 
-def placed_runs(runs: Sequence[AxisRun], keys: ImportKeys, where: str, facts: Sequence[Fact] = ()) -> list[Sheet]:
-    """Readings of runs as places along the lines that the job gives for their axes; a run back has points of its own."""
+def placed_runs(
+    runs: Sequence[AxisRun], keys: ImportKeys, where: str, facts: Sequence[Fact] = (), stated: Stated | None = None
+) -> list[Sheet]:
+    """Readings of runs as places along the lines that the file or the job gives; a run back has points of its own.
+
+    stated : places of axes by the file, and its words.
+    """
     rows: list[Row] = []
-    axes = [*dict.fromkeys(run.axis for run in runs)]
+    axes, stated = [*dict.fromkeys(run.axis for run in runs)], stated or {}
+    places = {**{axis: place for axis, (place, _) in stated.items()}, **keys.lines}
     for axis in axes:
-        if axis not in keys.lines:
+        if axis not in places:
             fix = f'Say it, with the place where its scale reads 0, in mm: lines = {{ "{axis}" = "along X from 0,200,300" }}'
             raise CmmUqError(f"nothing says where line {axis!r} lies, along which was measured", where=where, fix=fix)
     for run in runs:
-        start, direction = place_of(keys.lines[run.axis])
+        start, direction = place_of(places[run.axis])
         measurement, first = axes.index(run.axis) + 1, 0 if run.way >= 0 else len(run.targets)
         approach = run.way * np.sign(direction) + 0.0
         for k, (target, deviation, line) in enumerate(run.targets, 1):
             reading = (*(start + target * direction), deviation, *direction, *approach)
             rows.append(("", [f"{cell:.10g}" for cell in (measurement, first + k, run.number, *reading)], line))
-    told = Fact("lines", say("Lines"), semicolons([Verbatim(f"{axis}: {keys.lines[axis]}") for axis in axes]))
-    return sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, told))
+    return sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, _told(axes, places, stated)))
 
 
 class _Runs:
@@ -238,7 +249,8 @@ class Rtl(TextReport):
             targets = [(found.targets[k], deviation, line) for k, deviation, line in own]
             way = sense if len(set(senses)) > 1 else 0
             runs.append(AxisRun(axis, way, senses[: i + 1].count(sense), targets))
-        return placed_runs(runs, keys, where, (encoding,))
+        place = place_of_axis(axis, (f"{name}: {text}" for name, text in found.facts.items()), 1.0, ".")
+        return placed_runs(runs, keys, where, (encoding,), {axis: place} if place else {})
 
 
 _MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm

@@ -224,10 +224,12 @@ def _understood(
     begun = replace(begun, head=tuple(head_of(understood.grid.sheet.rows[head.row])) if head.row < head.first else ())
     if reading.kind == "runs":
         runs = axis_runs(reading, understood.sheets, where)
-        sheet = placed_runs(runs, keys, where)[0]
+        stated = understood.axis_places(runs)
+        sheet = placed_runs(runs, keys, where, stated=stated)[0]
         header = header_of(sheet, keys.model_copy(update={"columns": {}}), where, POINTS)
         assert header is not None  # of the head that was written  # noqa: S101
-        return _points(sheet, header, keys, where, reach_mm, begun, points=True)
+        table = _points(sheet, header, keys, where, reach_mm, begun, points=True)
+        return replace(table, places={axis: place for axis, (place, _) in stated.items()} | keys.lines)
     lines, places = reading.lines, dict[str, str]()
     if reading.kind == "points":
         columns, facts = understood.points(keys, where, reach_mm)

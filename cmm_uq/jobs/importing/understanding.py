@@ -30,10 +30,10 @@ from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary
 from cmm_uq.jobs.importing.lengths.evidence import sums_of
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lines_and_runs
-from cmm_uq.jobs.importing.lengths.places import says_figures, stated_places
+from cmm_uq.jobs.importing.lengths.places import place_of_axis, says_figures, stated_places
 from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
-from cmm_uq.jobs.importing.lines import MeasuredLengths, axis_in
+from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths, axis_in
 from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, rows_left_out, said_by
 
@@ -93,10 +93,8 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     if not chosen or (chosen[0][0].kind == "points" and not counted):
         return None
     _refuse_unmatched([grid for _, grid in chosen], keys, where)
-    elsewhere: list[tuple[str, str]] = []
-    if chosen[0][0].kind == "lengths":
-        _refuse_same_lines(chosen, where)
-        elsewhere = _said_elsewhere(upright, chosen)
+    elsewhere = _said_elsewhere(upright, chosen)
+    _refuse_same_lines(chosen, where)
     left_out: list[str] = []
     _take_results(found, chosen)
     for grid in {id(own): own for _, own in chosen}.values():
@@ -175,21 +173,28 @@ def _refuse_unmatched(grids: Sequence[CutSheet], keys: Mapping[str, Sources], wh
 def _refuse_same_lines(chosen: Sequence[Found], where: str) -> None:
     """Sheets with the same lengths on lines of the same names are two recordings, unless their names count lines or runs."""
     sheets: dict[str, list[object]] = {}
-    for reading, grid in chosen:
+    for reading, grid in chosen if chosen[0][0].kind == "lengths" else ():
         of_line = [label.values for label in reading.every_label if counted(label, lengths=True) == "line"]
         of_line = of_line or [label.values for label in reading.every_label if label.sort == "column"]
         lengths = [own[0] for own in reading.figures]
         sheets.setdefault(grid.sheet.name, []).append(sorted(map(str, zip(lengths, *of_line, strict=True))))
     words = any(hint(name, lengths=True) or axis_in(name) or name.strip().upper() in {*"XYZ"} for name in sheets)
     hinted = words or len({re.sub(r"\d+", "0", name) for name in sheets}) == 1
-    first, *others = sheets
-    if not hinted and any(map(bool, sheets[first])) and any(sheets[first] == sheets[other] for other in others):
+    first, *others = sheets or [""]
+    if (
+        not hinted
+        and others
+        and any(map(bool, sheets[first]))
+        and any(sheets[first] == sheets[other] for other in others)
+    ):
         what = f"sheets {', '.join(map(repr, sheets))} hold lengths of the same names, each a recording of its own"
         raise NotReadError(what, where=where, fix=f'Say which: sheet = "{first}"')
 
 
 def _said_elsewhere(sheets: Sequence[Sheet], chosen: Sequence[Found]) -> list[tuple[str, str]]:
-    """Rows that are not read and may say where lines lie, each with the text in its first cell."""
+    """Rows that are not read and may say where lines lie, each with the text in its first cell; none of places themselves."""
+    if chosen[0][0].kind == "points":
+        return []
     taken = {(grid.sheet.name, line) for reading, grid in chosen for line in reading.lines}
     found = []
     for grid in map(CutSheet, sheets):
@@ -329,6 +334,19 @@ class Understanding:
             *(lines, bare_, runs.tolist(), measured.tolist(), own.lines, own.covariates, self.sources),
             *(self.facts(of_unit, used), tuple(self.left_out), places),
         )
+
+    def axis_places(self, runs: Sequence[AxisRun]) -> dict[str, tuple[str, str]]:
+        """Where runs along axes lie, by the texts above them; of one axis alone by any."""
+        axes, found = dict.fromkeys(run.axis for run in runs), dict[str, tuple[str, str]]()
+        unit = self.reading.unit or unit_elsewhere(self.sheets, small=False) or formats.UNITS["mm"]
+        for axis in axes:
+            lines = {line for run in runs if run.axis == axis for *_, line in run.targets}
+            own = zip(self.reading.lines, self.reading.labels, strict=True)
+            texts = [text for line, labels in own if line in lines for text in labels["place", ""].split("\n")]
+            texts += [line for _, text in self.elsewhere if len(axes) == 1 for line in text.split("\n")]
+            place = place_of_axis(axis, dict.fromkeys(texts), unit.up / unit.down, self.grid.sign)
+            found |= {axis: place} if place else {}
+        return found
 
     def points(
         self, keys: ImportKeys, where: str, reach_mm: float | None

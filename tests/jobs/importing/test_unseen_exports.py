@@ -164,7 +164,8 @@ def test_it_is_read_as_its_author_reads_it(name: str) -> None:
             alike(grouped(repeat, xyz), grouped(rows[2], of))
     elif expected["kind"] == "runs":
         way = [value > 0 for value in sum(columns[f"approach_{axis}"] for axis in "xyz")]
-        values, of = np.column_stack([columns["x_mm"], columns["reading_um"]]), list(zip(rows[1], rows[4], strict=True))
+        target = sum(columns[f"{axis}_mm"] * columns[f"read_{axis}"] for axis in "xyz")
+        values, of = np.column_stack([target, columns["reading_um"]]), list(zip(rows[1], rows[4], strict=True))
         alike(grouped([*zip(way, repeat, strict=True)], values), grouped([*zip(rows[2], rows[3], strict=True)], of))
         forward = grouped([side for side in way if side], values[way])
         alike(

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.factors import LINE, hint
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
 START, END, DIRECTION = "start", "end", "direction"
@@ -321,31 +322,35 @@ def _starts(texts: Iterable[str], sign: str) -> list[Floats]:
     return [own for said in each if (own := _full(said.start, said.across)) is not None][:1]
 
 
-def _about(name: str, names: Iterable[str], elsewhere: Sequence[tuple[str, str]]) -> list[str]:
-    """Texts elsewhere with the name of a line up to that of another, or its number where each has its own."""
+def _about(name: str, names: Collection[str], elsewhere: Sequence[tuple[str, str]]) -> list[str]:
+    """Texts elsewhere with the name of a line up to that of another, or its number where each has its own; of one line all."""
     numbers = {one: re.findall(r"\d+", one) for one in names}
-    apart = len({own[0] for own in numbers.values() if own}) == len(numbers) and all(
-        len(own) == 1 for own in numbers.values()
-    )
-    found = [
-        text
-        for first, text in elsewhere
-        if first == name or (apart and re.findall(r"\d+", first) == numbers[name] and len(first) < _LABEL)
-    ]
-    pattern = re.compile(
-        "|".join(
-            rf"(?<!\w){re.escape(one)}(?!\w)"
-            for one in sorted(names, key=len, reverse=True)
-            if not one.isdigit() and len(one) > 1
-        )
-        or "(?!)"
-    )
+    apart = len({*map(tuple, numbers.values())}) == len(names) and all(len(own) == 1 for own in numbers.values())
+    own = {
+        first for first, _ in elsewhere if len(first) < _LABEL and apart and re.findall(r"\d+", first) == numbers[name]
+    }
+    found = [text for first, text in elsewhere if len(names) == 1 or first in own | {name}]
+    called = {one: one for one in names if not one.isdigit() and len(one) > 1}
+    called |= {part: one for one in names for part in re.findall(r"\b[^\W\d_]+\d+\b", one)}  # as P1 of ``Position P1``
+    words = (re.escape(one) for one in sorted(called, key=len, reverse=True))
+    pattern = re.compile(rf"(?<!\w)(?:{'|'.join(words) or '(?!)'})(?!\w)")
     for _, text in elsewhere:
         parts = [*pattern.finditer(text)]
-        for k, part in enumerate(parts):
-            if part[0] == name:
-                found.append(text[part.start() : parts[k + 1].start() if k + 1 < len(parts) else len(text)])
+        ends = [*(part.start() for part in parts[1:]), len(text)] if parts else []
+        found += [text[part.start() : end] for part, end in zip(parts, ends, strict=True) if called[part[0]] == name]
     return [line for text in dict.fromkeys(found) for line in text.split("\n")]
+
+
+def place_of_axis(axis: str, texts: Iterable[str], mm: float, sign: str) -> tuple[str, str] | None:
+    """Where a run along an axis lies, its scale at 0, in mm: where a text that names it gives both other coordinates."""
+    found: dict[str, str] = {}
+    for text in texts:
+        said = said_in([text], sign)
+        named = hint(text, lengths=True) == LINE or {one[-1] for one in said.axes} == {axis}
+        if {*said.across} == {*"XYZ"} - {axis} and named and not said.odd:
+            place = f"along {axis} from {_text(np.array([(said.across | {axis: 0.0})[one] for one in 'XYZ']))}"
+            found[_in_mm(place, mm)] = text
+    return found.popitem() if len(found) == 1 else None
 
 
 def _in_mm(place: str, mm: float) -> str:
