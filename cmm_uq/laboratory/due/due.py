@@ -122,17 +122,32 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
     item = partial(DueItem, "machine", machine.serial, machine.name, machine.model, machine.place)
     if not done:
         return item(None, None, say("never calibrated up to {on}", on=day(on)), tuple(remarks))
-    last = done[-1]
+    last, released = done[-1], [one for one in done if one.state == "released"]
+    waits = last.state == "draft" and bool(released)
     if last.state == "draft":
-        remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
+        remarks.append(
+            say(
+                "Its certificate of {day} is a draft that nobody has released: it begins no interval.",
+                day=day(last.day),
+            )
+            if waits
+            else say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day))
+        )
     if not of.limited:
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
     elif last.decision not in (*BEYOND, NONE, "pass"):
         decision = Verbatim(last.decision)
         remarks.append(say("Its last certificate does not state that it conforms: {decision}.", decision=decision))
-    adjusted = [one for one in (*machine.adjusted, *(one.adjusted_since for one in known))
-                if one is not None and last.day < one <= on]  # fmt: skip
+    every = [
+        one for one in (*machine.adjusted, *(one.adjusted_since for one in known)) if one is not None and one <= on
+    ]
+    adjusted = [one for one in every if last.day < one]
     due, reason = _due_date(of, last, adjusted, pool)
+    counts = last
+    if waits:  # a draft may end an interval, and begins none
+        before = _due_date(of, released[-1], [one for one in every if released[-1].day < one], pool)
+        if before[0] < due:
+            (due, reason), counts = before, released[-1]
     blocked: Text | None = None
     if (used := artefacts.get(last.artefact)) is not None and used.due is not None and used.due < max(on, due):
         artefact, until = Verbatim(used.serial), day(used.due)
@@ -144,7 +159,9 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
         else:
             text = say("Its artefact {artefact} is itself due on {due}, before that.", artefact=artefact, due=until)
             remarks.append(text)
-    return item(last.day, due, reason, tuple(remarks), last.artefact, blocked, last.decision in BEYOND and not adjusted)
+    return item(
+        counts.day, due, reason, tuple(remarks), last.artefact, blocked, last.decision in BEYOND and not adjusted
+    )
 
 
 def _due_date(

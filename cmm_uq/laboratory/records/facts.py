@@ -74,6 +74,21 @@ def canonical(content: Mapping[str, Any]) -> str:
     return text
 
 
+OF_CERTIFICATE = ("certificate", "laboratory", "calibrated", "due")  # of an artefact, what entries say
+
+
+def certificate_after(known: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    """What holds of an artefact's certificate after an entry: what that leaves unsaid stays, unless it names another one."""
+    held = {} if another_certificate(known, said) else known
+    return {name: said.get(name) or held.get(name) or None for name in OF_CERTIFICATE}
+
+
+def another_certificate(known: Mapping[str, Any], said: Mapping[str, Any]) -> bool:
+    """Whether both say which it is, and not the same."""
+    both = ((known.get(name), said.get(name)) for name in ("certificate", "calibrated"))
+    return any(one and other and one != other for one, other in both)
+
+
 def hash_of(previous: str, number: int, at: str, kind: str, content: str) -> str:
     """SHA-256 of an entry, as the JSON list of its parts: no two entries have the same text."""
     parts = json.dumps([previous, number, at, kind, content], separators=(",", ":"), ensure_ascii=False)

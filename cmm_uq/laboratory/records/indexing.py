@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 STATE_AFTER = {"withdrawal": "withdrawn", "replacement": "replaced"}
+_FILLED = ("calibrate", *facts.OF_CERTIFICATE)  # columns that an older entry fills where they are empty
 MOST = 1000  # findings after which no more are looked for
 _BLOCK = 5000  # entries that are read or written together
 
@@ -117,8 +118,8 @@ class Indexer:
         row: Row = {name: text for name in names if (text := called(said, name))}  # what is not said changes nothing
         if "name" in row:
             row["named"] = spelled(row["name"])
-        if "calibrate" in said:
-            row["calibrate"] = json.dumps(said["calibrate"], sort_keys=True) if said["calibrate"] else None
+        if said.get("calibrate"):
+            row["calibrate"] = json.dumps(said["calibrate"], sort_keys=True)
 
         def first() -> Row:
             known = {"called": self._name_of(said), "spelled": spelled(called(said, "serial", "name"))}
@@ -140,20 +141,33 @@ class Indexer:
     def _artefact(self, said: Mapping[str, Any], kind: str, day: str, entry: int) -> int | None:
         if not (key := facts.artefact_key(said)):
             return None
-        row: Row = {name: called(said, name) for name in ("certificate", "laboratory")} | {"kind": kind}
-        row |= {name: said.get(name) or None for name in ("calibrated", "due")}
+        known = self._recognised[artefacts].get(key) or self._stored(artefacts, artefacts.c.recognised == key) or {}
+        own: Row = {name: called(said, name) for name in ("certificate", "laboratory")}
+        own |= {name: said.get(name) or None for name in ("calibrated", "due")}
+        after = facts.certificate_after(known, own)
+        # what an older entry says of the same certificate, and no newer one does
+        if known and day < known["day"] and facts.another_certificate(known, own):
+            after = {}
+        texts = {name: after[name] or "" for name in ("certificate", "laboratory") if after}
+        row: Row = {"kind": kind, **after, **texts}
         return self._thing(artefacts, key, row, lambda: {"called": called(said, "serial", "certificate", "name")}, day,
                            entry)  # fmt: skip
 
     def _thing(self, table: Table, key: str, said: Row, first: Callable[[], Row], day: str, entry: int) -> int:
-        """Number of the row that is recognised by a key: made, or changed by what is no older than the row."""
+        """Number of the row that is recognised by a key: made, or changed by what is no older than the row.
+
+        What is older says of rule and certificate what nobody said since.
+        """
         cache, waiting = self._recognised[table], self._rows[table]
         row = cache.get(key) or self._stored(table, table.c.recognised == key)
         if row is None:
             row = {"id": self._next(table), "recognised": key, **first(), **said, "day": day, "entry": entry}
             waiting.append(row)
-        elif day >= row["day"] and (changed := {name: value for name, value in said.items() if value != row[name]}):
-            changed |= {"day": day, "entry": entry}
+        elif changed := {
+            name: value for name, value in said.items()
+            if value != row[name] and (day >= row["day"] or (not row[name] and name in _FILLED))
+        }:  # fmt: skip
+            changed |= {"day": day, "entry": entry} if day >= row["day"] else {}
             row.update(changed)
             if not waiting or row["id"] < waiting[0]["id"]:  # it is written already: rows are numbered as they come
                 self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))

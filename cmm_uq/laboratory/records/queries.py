@@ -111,11 +111,13 @@ class RecordQueries:
                     return found
         return []
 
-    def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[facts.RecordedCertificate]:
+    def latest(
+        self, until: dt.date | None = None, *, values: bool = True, states: Collection[str] = facts.STANDING
+    ) -> list[facts.RecordedCertificate]:
         """Newest measured and standing certificate of each machine, none later than a day, by serial; no checks."""
         rows: list[facts.RecordedCertificate] = []
         with self.reading() as connection:
-            found = connection.execute(select(newest_of_machine(until)).select_from(machines)).scalars()
+            found = connection.execute(select(newest_of_machine(until, states)).select_from(machines)).scalars()
             for block in blocks(sorted(entry for entry in found if entry is not None)):
                 rows += self._certificates(connection, _CERTIFICATES.where(_C.entry.in_(block)), values=values)
         return sorted(rows, key=lambda one: (one.machine, one.entry))
@@ -218,10 +220,10 @@ class RecordQueries:
         ]  # fmt: skip
 
 
-def newest_of_machine(until: dt.date | None = None) -> Any:
+def newest_of_machine(until: dt.date | None = None, states: Collection[str] = facts.STANDING) -> Any:
     """Entry of each machine's newest measured certificate that stands, as a subquery of ``machines``."""
     c = certificates.alias().c
-    query = select(c.entry).where(c.machine == machines.c.id, *_measured(c), c.interim.is_(False))
+    query = select(c.entry).where(c.machine == machines.c.id, *_measured(c), c.interim.is_(False), c.state.in_(states))
     if until:
         query = query.where(c.day <= until.isoformat())
     return query.order_by(c.day.desc(), c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
@@ -256,17 +258,20 @@ _RULE, _ARTEFACT = ("calibrate",), ("called", "kind", "certificate", "laboratory
 def _known_on(
     connection: Connection, table: Table, names: Sequence[str], on: dt.date | None, *where: ColumnElement[bool]
 ) -> list[dict[str, Any]]:
-    """Rows of machines or artefacts, by name; what a recording of after a day changed as the one before that has it."""
+    """Rows of machines or artefacts, by name; what a recording of after a day changed as those before that have it."""
     part, until = table.name.removesuffix("s"), (on or dt.date.max).isoformat()
-    newest = select(entries.c.content).join(certificates, _C.entry == entries.c.number).where(_C.day <= until)
-    newest = newest.order_by(_C.day.desc(), _C.entry.desc()).limit(1)
+    before = select(entries.c.content).join(certificates, _C.entry == entries.c.number).where(_C.day <= until)
+    before = before.order_by(_C.day, _C.entry)
     rows = [dict(row) for row in connection.execute(select(table).where(*where).order_by(table.c.called)).mappings()]
     for row in rows:
         if row["day"] > until:
-            content = connection.execute(newest.where(_C[part] == row["id"])).scalar()
-            said = json.loads(content)[part] if content else {}
-            row |= {name: said.get(name) for name in names}
-            row |= {name: json.dumps(row[name]) for name in _RULE if row.get(name)}
+            row |= dict.fromkeys(names)
+            for content in connection.execute(before.where(_C[part] == row["id"])).scalars():
+                said = json.loads(content)[part]
+                if table is artefacts:
+                    row |= facts.certificate_after(row, said)
+                elif said.get("calibrate"):
+                    row["calibrate"] = json.dumps(said["calibrate"])
     return rows
 
 

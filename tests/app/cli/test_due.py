@@ -122,6 +122,73 @@ def test_a_certificate_of_tomorrow_changes_no_artefact_and_no_rule(tmp_path: Pat
         assert records.machine("1102").calibrate == {"every_months": 60}
 
 
+@pytest.mark.parametrize("backwards", [False, True], ids=["in turn", "the last first"])
+def test_what_a_later_job_leaves_unsaid_erases_nothing(tmp_path: Path, backwards: bool) -> None:
+    """Due on 2026-10-01 by the first job; every six months by its rule. Neither was so any more after a job without."""
+    first, second = certificate("1102", dt.date(2025, 12, 1)), certificate("1102", dt.date(2026, 3, 2))
+    first["artefact"] |= {"due": "2026-10-01"}
+    first["machine"] |= {"calibrate": {"every_months": 6}}
+    second["artefact"] = {"serial": "BB-7", "name": "Ballbar", "certificate": "", "calibrated": None, "due": None}
+    second["machine"] |= {"calibrate": None}
+    place = recorded(tmp_path, *((second, first) if backwards else (first, second)))
+    for on in (ON, "2026-11-01"):
+        items = json.loads(run("due", "--records", place, "--on", on, "--json").stdout)["items"]
+        found = {one["item"]: (one["state"], one["due"]) for one in items}
+        assert found == {"artefact": ("overdue", "2026-10-01"), "machine": ("overdue", "2026-09-02")}
+    with open_records(place, read_only=True) as records:
+        assert [one for one in records.verify(files=False) if one.kind != "clock"] == []
+
+
+def test_another_certificate_of_the_artefact_takes_nothing_over_from_the_one_before(tmp_path: Path) -> None:
+    """Calibrated again, until when nobody says: not until the day of the old certificate, nor later."""
+    again = certificate("1102", dt.date(2026, 3, 2))
+    again["artefact"] |= {"certificate": "PTB 2", "calibrated": "2026-02-01", "due": None}
+    place = recorded(tmp_path, certificate("1102", dt.date(2025, 12, 1)), again)
+    item = json.loads(run("due", "--records", place, "--on", ON, "--json").stdout)["items"][-1]
+    assert (item["state"], item["due"], item["last"]) == ("unknown", None, "2026-02-01")
+
+
+def test_a_job_of_after_the_day_that_says_nothing_erases_nothing_then(tmp_path: Path) -> None:
+    place = recorded(
+        tmp_path, certificate("1102", dt.date(2025, 11, 2), machine=machine("1102", calibrate={"every_months": 6})),
+        certificate("1102", dt.date(2026, 1, 2), artefact={"serial": "BB-7", "name": "Ballbar"}),
+        certificate("1102", dt.date(2096, 3, 2), artefact={"serial": "BB-7", "certificate": "PTB 9", "due": "2098-10-01"},
+                    machine=machine("1102", calibrate={"every_months": 60})),
+    )  # fmt: skip
+    items = json.loads(run("due", "--records", place, "--on", ON, "--json").stdout)["items"]
+    assert {one["item"]: one["due"] for one in items} == {"artefact": "2027-06-01", "machine": "2026-07-02"}
+
+
+@pytest.mark.parametrize("asked", [(), ("1102",)])
+def test_a_draft_moves_no_day_that_a_released_certificate_set(tmp_path: Path, asked: tuple[str, ...]) -> None:
+    """Where nothing was ever released, drafts are all there is; a draft that fails ends the interval."""
+    place = recorded(tmp_path, certificate("1102", dt.date(2025, 11, 2)), certificate("1102", dt.date(2026, 11, 1)),
+                     certificate("1103", dt.date(2026, 11, 1)))  # fmt: skip
+    signed = {"certificate": 1, "by": "A. Releaser", "reason": "checked", "complete": True}
+
+    def found(serial: str = "1102") -> dict[str, Any]:
+        items = json.loads(run("due", *asked, "--records", place, "--on", ON, "--json").stdout)["items"]
+        one: dict[str, Any] = next((each for each in items if each["serial"] == serial), {})
+        return one
+
+    assert (found()["state"], found()["due"]) == ("later", "2027-11-01")
+    with open_records(place) as records:
+        records.append("release", signed)
+    assert (found()["state"], found()["due"], found()["last"]) == ("overdue", "2026-11-02", "2025-11-02")
+    assert found()["remarks"] == [
+        "Its certificate of 2026-11-01 is a draft that nobody has released: it begins no interval."
+    ]
+    if not asked:
+        assert found("1103")["due"] == "2027-11-01"
+    with open_records(place) as records:
+        records.append("release", signed | {"certificate": 2})
+    assert (found()["state"], found()["due"]) == ("later", "2027-11-01")
+    assert not any("draft" in text for text in found()["remarks"])
+    with open_records(place) as records:
+        records.append("report", certificate("1102", dt.date(2026, 11, 5), decision="fail"))
+    assert (found()["state"], found()["due"]) == ("overdue", "2026-11-05")
+
+
 def test_an_interim_check_out_of_control_is_found_among_all_machines(three: Path) -> None:
     far = (("scale_x.ppm", "Scale error of x", "ppm", 6.0, 0.5, 5.0, 7.0, 0.2, 8.0),)
     with open_records(three) as records:

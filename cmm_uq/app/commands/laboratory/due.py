@@ -135,12 +135,15 @@ class _Reading:
     def __init__(self, records: Records, on: dt.date, fleets: Mapping[str, FleetPrior], *, whole: bool) -> None:
         self.records, self._on, self._fleets, self._late = records, on, fleets, records.dated_after(on)
         self._newest: dict[str, RecordedCertificate] = {}
+        self._released: dict[str, RecordedCertificate] = {}
         self._checked: dict[str, RecordedCertificate] = {}
         self._without: set[int] = set()
         self._pasts: dict[str, list[RecordedCertificate]] = {}
         self._pools: dict[tuple[str, str], list[CompletedInterval]] = {}
         if not whole:
             self._newest = {one.machine: one for one in records.latest(on, values=False)}
+            released = records.latest(on, values=False, states=("released",))
+            self._released = {one.machine: one for one in released}
             self._checked = {one.machine: one for one in records.checks() if one.day <= on}
             undecided = [one.entry for one in self._newest.values() if one.decision == "none"]
             self._without = set(undecided) - records.limited(undecided)
@@ -151,7 +154,9 @@ class _Reading:
         newest, checked = self._newest.get(machine.serial), self._checked.get(machine.serial)
         later = checked is not None and (newest is None or (checked.day, checked.entry) > (newest.day, newest.entry))
         if newest is not None and not later and rule.method == "fixed":
-            return CalibrationRecord(machine, rule, [newest], newest.entry not in self._without, late)
+            released = self._released.get(machine.serial, newest)
+            newer = [newest] if released.entry != newest.entry else []
+            return CalibrationRecord(machine, rule, [released, *newer], newest.entry not in self._without, late)
         past = self._past(machine.serial)
         limited = any(part_used(one) is not None or one.decision != "none" for one in calibrations(past)[-1:])
         priors = _priors(self._fleets, machine) if rule.method == "drift" else {}
