@@ -106,7 +106,9 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     every = [c for own in triples for c in own.columns]
     if not triples or len({c.unit.name for c in every if c.unit}) > 1:
         return None
-    if all(c.step >= 1 for c in every) and any(c.role == "measured" and c.step < 1 < c.values[0] for c in lengths):
+    if all(c.step >= 1 for c in every) and any(
+        c.role in (None, "measured") and c.step < 1 < c.values[0] for c in lengths
+    ):
         return None  # whole places, at which lengths were measured
     reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
     alone = not checked and sum(own.wide for own in named) == 1
@@ -160,6 +162,13 @@ def _named(columns: Sequence[FigureColumn], levels: Mapping[str, float]) -> list
                 )
                 for c in first
             ]
+    parts = [rest for rest, own in found.items() if len(own) < 3]
+    for a, b in permutations(parts, 2):
+        both = {**found[a], **found[b]}
+        each = [columns.index(c) for axis in "xyz" for c in both.get(axis, ())]
+        disjoint = len(found[a]) + len(found[b]) == len(both) == len(each) == 3
+        if "x" in found[a] and disjoint and each == [*range(each[0], each[0] + 3)]:
+            found |= {a: both, b: {}}  # a head that ends at an empty column
     whole = [(rest, own) for rest, own in found.items() if len(own) == 3 and len({*map(len, own.values())}) == 1]
     forms = [_COUNTED.sub("0", " ".join(rest)) for rest, _ in whole]
     if any(len(own) == 2 and _COUNTED.sub("0", " ".join(rest)) in forms for rest, own in found.items()):

@@ -117,7 +117,8 @@ def test_runs_there_and_back_are_the_same_down_and_across() -> None:
     across += [[f"Zum{n} (µm)", *(f"{v:.2f}" for v in own)] for n, own in zip("abc", summed, strict=True)]
     down = [across[0], *(list(row) for row in zip(*(row for row in across[1:] if row[0]), strict=True))]
     found, turned = runs(down), runs(across)
-    for table in (found, turned):
+    apart = runs([[*row[:3], "", *row[3:]] for row in across])
+    for table in (found, turned, apart):
         assert len(table.lines) == 36
         assert table.columns["reading_um"][table.columns["approach_x"] > 0].tolist() == pytest.approx(
             np.ravel(there).tolist()
@@ -125,6 +126,22 @@ def test_runs_there_and_back_are_the_same_down_and_across() -> None:
     assert {name: values.tolist() for name, values in found.columns.items()} == {
         n: v.tolist() for n, v in turned.columns.items()
     }
+
+
+def test_tables_across_may_have_an_empty_column() -> None:
+    rows = [["Odchylky v µm", ""]]
+    for axis, count in zip("XYZ", (8, 7, 6), strict=True):
+        rows += [[f"Osa {axis}"], ["Poloha [mm]", *(f"{75 * k}" for k in range(count))]]
+        for n, sign in ((n, sign) for n in (1, 2, 3) for sign in "+-"):
+            rows += [[f"{n} {sign}", *(f"{(7 * k + 5 * n + ord(sign)) % 11 / 10:.2f}" for k in range(count))]]
+    apart = [row if len(row) < 3 else [*row[:2], "", *row[2:]] for row in rows]
+    lines = {"lines": {axis: f"along {axis} from 0,0,0" for axis in "XYZ"}}
+    found, same = (
+        imported("\n".join(map("\t".join, each)).encode(), "a.tsv", ImportKeys.model_validate(lines))
+        for each in (apart, rows)
+    )
+    assert len(found.lines) == 6 * (8 + 7 + 6)
+    assert {n: v.tolist() for n, v in found.columns.items()} == {n: v.tolist() for n, v in same.columns.items()}
 
 
 def test_a_row_whose_text_says_where_it_lies_is_measured_as_those_beside_it() -> None:

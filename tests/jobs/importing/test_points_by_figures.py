@@ -75,6 +75,18 @@ def test_points_are_the_same_below_any_words_in_any_order(
     assert rows(read(table, sign)) == EXPECTED
 
 
+def test_an_empty_column_among_those_of_one_point_changes_nothing() -> None:
+    """Three runs side by side, of which a head stands over each; without the column the same."""
+    random = np.random.default_rng(8)
+    xyz = np.round(np.linspace([120, 900, 300], [960, 180, 305], 8)[:, None] + random.normal(0, 1e-3, (8, 3, 3)), 4)
+    cells = [[f"{ball}", *(f"{one:.4f}" for one in own.ravel())] for ball, own in enumerate(xyz, 1)]
+    heads = [["", "Medida 1", "", "", "Medida 2", "", "", "Medida 3", "", ""], ["Esfera", *("XYZ" * 3)]]
+    plain = read([list(one) for one in zip(*heads, *cells, strict=True)])
+    apart = read([list(one) for one in zip(*([*row[:2], "", *row[2:]] for row in [*heads, *cells]), strict=True)])
+    assert len(plain.lines) == 24
+    assert rows(plain) == rows(apart)
+
+
 def test_a_row_for_each_axis_is_the_same() -> None:
     """A feature a block, with its diameter; names of three parts, and no word that is known."""
     lines = ["Wegi: mm"]

@@ -65,7 +65,7 @@ def _part(grid: CutSheet, i: int) -> AcrossPart | None:
     columns = [k for k, f in enumerate(grid.figures[i]) if f is not None]
     values = np.array([f[0] for f in grid.figures[i] if f is not None])
     apart = np.abs(np.diff(values)).min(initial=np.inf)
-    if not 2 < len(columns) <= _WIDEST or columns[0] == 0 or columns[-1] - columns[0] >= len(columns) or apart < _APART:
+    if not 2 < len(columns) <= _WIDEST or columns[0] == 0 or apart < _APART or not _side_by_side(grid, i, columns):
         return None
     part = AcrossPart([], [], [i], columns)
     for j in range(i + 1, min(len(grid.figures), i + _WIDEST)):
@@ -92,3 +92,9 @@ def _part(grid: CutSheet, i: int) -> AcrossPart | None:
             break
         part.over.insert(0, j)
     return part if len(part.rows) > 1 else None
+
+
+def _side_by_side(grid: CutSheet, i: int, columns: Sequence[int]) -> bool:
+    """Whether nothing stands between columns of a row, nor in the row below it."""
+    between = {*range(columns[0], columns[-1])} - {*columns}
+    return not any(grid.text(row, k) for row in (i, min(i + 1, len(grid.figures) - 1)) for k in between)
