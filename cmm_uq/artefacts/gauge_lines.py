@@ -256,18 +256,18 @@ class StepGauge(Artefact):
 
     def _refuse_what_is_no_gauge(self, where: str | None) -> None:
         points, lines, what = self.points, self._lines, self.title.lower()
-        at = (points.point == 1) & (np.abs(self.reference) > _SAME_FACE)
-        problem = (
-            f"point 1 has reference_mm = {self.reference[np.argmax(at)]:g}: distances count from point 1, so it has 0"
-        )
+        zero = min(1, int(points.point.min()))  # faces may be numbered from 0
+        at = (points.point == zero) & (np.abs(self.reference) > _SAME_FACE)
+        first = self.reference[np.argmax(at)]
+        problem = f"point {zero} has reference_mm = {first:g}: distances count from point {zero}, so it has 0"
         refuse(points, at, where, problem, "Subtract the first distance from all of the measurement")
         spans = lines.sums(self._ends * self.reference)
         bars = np.linalg.norm(lines.sums(self._ends[:, None] * points.xyz), axis=1)
-        first = "the first and the farthest face of measurement {} lie in one place"
+        together = "the first and the farthest face of measurement {} lie in one place"
         for wrong, problem, fix in (
             (spans <= _SAME_FACE, f"measurement {{}} has a single face, so it tells no length of the {what}",
              "Record at least two faces of different reference_mm in each measurement, or leave it out"),
-            (bars == 0, first, "Mend its coordinates or reference_mm"),
+            (bars == 0, together, "Mend its coordinates or reference_mm"),
         ):  # fmt: skip
             number = lines.numbers[np.argmax(wrong)]
             refuse(points, (points.measurement == number) & wrong.any(), where, problem.format(number), fix)

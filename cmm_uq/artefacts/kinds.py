@@ -54,7 +54,7 @@ def _own_rule(figure: str, limit_um: float, measurements: int, repeats: int, poi
 
 
 BALLBAR = _kind("ballbar", BallbarFacts, "optical.ballbar:observe", Beginning(
-    title="Ballbar in twenty positions (ASME B89.4.1)",
+    title="Ballbar in twenty positions (ASME B89.4.1)", measured="Ballbar: two balls on a bar",
     numbering="One measurement is one position of the bar; points 1 and 2 are the centres of its balls.",
     artefact={"name": "Ballbar", "length_mm": 400.0, "u_um": 0.5, "cte_per_k": 11.5e-6},
     conformity={"standard": "ASME B89.4.1-1997", "limit_um": 10.0, "rule": "ISO 14253-1"},
@@ -87,12 +87,14 @@ def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str,
 NORMALS = ("nx", "ny", "nz")
 STEP_GAUGE = _gauge(
     "step_gauge", "StepGauge", ("hysteresis_x", "hysteresis_y", "hysteresis_z"), APPROACHES,
-    title="Step gauge on seven lines (ISO 10360-2)", artefact={"name": "Step gauge", "u_um": 0.4, "cte_per_k": 11.5e-6},
+    title="Step gauge on seven lines (ISO 10360-2)",
+    measured="Step gauge or ball beam: points on a line", artefact={"name": "Step gauge", "u_um": 0.4, "cte_per_k": 11.5e-6},
     numbering="One measurement is one line; its points are the faces, numbered as they are met, again where met again.",
 )  # fmt: skip
 GAUGE_BLOCKS = _gauge(
     "gauge_blocks", "GaugeBlocks", ("probe_radius",), (*APPROACHES, *NORMALS),
-    title="Gauge blocks on seven lines (ISO 10360-2)", artefact={"name": "Gauge blocks", "u_um": 0.15, "cte_per_k": 11.5e-6},
+    title="Gauge blocks on seven lines (ISO 10360-2)",
+    measured="Gauge blocks, or any lengths on lines", artefact={"name": "Gauge blocks", "u_um": 0.15, "cte_per_k": 11.5e-6},
     numbering="One measurement is one block in one place; points 1 and 2 are its outer faces.",
 )  # fmt: skip
 
@@ -104,7 +106,7 @@ class PlateFacts(ReferencedFacts):
 
 
 PLATE = _kind("plate", PlateFacts, "plate:Plate", Beginning(
-    title="Ball plate in three attitudes, two places each",
+    title="Ball plate in three attitudes, two places each", measured="Ball plate, hole plate, or balls in a body",
     numbering="One measurement is one place of the plate; its points are the balls or holes.",
     artefact={"name": "Ball plate", "u_um": 0.5, "cte_per_k": 11.5e-6}, plan={"pitch_mm": 80.0, "repeats": 1},
     columns=dict.fromkeys((f"reference_{a}_mm" for a in AXES), ""),
@@ -152,7 +154,7 @@ class SphereFacts(ArtefactFacts):
 
 
 SPHERE = _kind("sphere", SphereFacts, "spheres.sphere:SphereArtefact", Beginning(
-    title="Test sphere, twenty-five points (ISO 10360-5)",
+    title="Test sphere, twenty-five points (ISO 10360-5)", measured="Test sphere: points all over a ball",
     numbering="One measurement is one place of the sphere; its points are the points probed.",
     artefact={"name": "Test sphere", "length_mm": 25.0, "u_um": 0.1, "form_um": 0.1},
     effects=("probe_radius", "probe_lobing"), test=circumstances(u_form_um=0.02), recorded=AT_20_C, plan={"repeats": 1},

@@ -30,7 +30,7 @@ for (const form of document.querySelectorAll("form[data-check]")) {
 }
 
 for (const field of document.querySelectorAll(".drop input[type=file]")) {
-  field.addEventListener("change", () => { if (field.files.length && field.form.action.endsWith("/desk/drop")) field.form.requestSubmit(); });
+  field.addEventListener("change", () => { if (field.files.length) field.form.requestSubmit(); });
 }
 
 for (const place of document.querySelectorAll("[data-events]")) {
@@ -80,6 +80,7 @@ function drawn(canvas, field, angles, after) {
     const v = vectors[n], beyond = Math.hypot(...v) > field.limit[n];
     pen.strokeStyle = colour(beyond ? "--bad" : "--accent"); pen.lineWidth = beyond ? 3 : 1.5;
     line(p, p.map((one, i) => one + magnified * v[i]));
+    pen.fillStyle = pen.strokeStyle; pen.beginPath(); pen.arc(...at(p), 3, 0, 7); pen.fill();
   });
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -192,6 +194,23 @@ def test_a_recording_that_is_none_of_a_gauge_is_refused(spoil: object, message: 
     assert callable(spoil)
     with pytest.raises(CmmUqError, match=message):
         StepGauge(GAUGE, spoil(step_gauge()))
+
+
+def test_faces_may_be_numbered_from_0() -> None:
+    points = step_gauge()
+    other = Points(points.xyz, points.measurement, points.point - 1, points.repeat, points.machine, points.columns)
+    np.testing.assert_array_equal(StepGauge(GAUGE, other).reference, StepGauge(GAUGE, points).reference)
+    with pytest.raises(CmmUqError, match="distances count from point 0"):
+        StepGauge(GAUGE, with_columns(other, reference_mm=other.columns["reference_mm"] + 5.0))
+
+
+def test_a_machine_whose_travel_nobody_states_has_no_fault_that_needs_it() -> None:
+    """Curved scales of the gauge itself are those of the machine over its travel."""
+    points = step_gauge()
+    bare = replace(points, machine=replace(points.machine, travel_mm=np.full((3, 2), np.nan)))
+    faults, every = (StepGauge(GAUGE, one).faults.keys() for one in (bare, points))
+    assert every - faults == {f"artefact_scale_curvature_{axis}" for axis in "xyz"}
+    assert faults <= every
 
 
 NOMINAL = artefact_facts(kind="step_gauge")

@@ -133,6 +133,9 @@ def _in_settings(tables: Mapping[str, Mapping[str, Any]]) -> Iterator[None]:
                 each.where = f"--set {key}" if place[1] in tables else key
                 each.fix = (each.fix or "").replace("Add it to job.toml", f"Give --set {key}=…")
                 each.args = (str(each),)
+        if error.also:  # the command tells the first alone
+            others = "; ".join(one.fix or one.problem for one in error.also)
+            error.fix = f"{error.fix}. Also {others[0].lower()}{others[1:]}"
         raise
 
 
@@ -151,6 +154,7 @@ def import_export(
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
     from cmm_uq.app.commands.jobs.exchange import (
+        amounts,
         example,
         lines_asked,
         placed_by_plan,
@@ -170,7 +174,7 @@ def import_export(
             export = read_export(file, keys)
     except CmmUqError as error:
         asked = lines_asked(error)
-        if save_as and asked is not None:
+        if save_as and asked is not None and asked[0] is not None:
             remember(save_as, keys, asked[0].head)
         if asked is not None and not silent:
             show_proposed(*asked)
@@ -181,7 +185,7 @@ def import_export(
         put(json_text.dumps(export.recognised.data, indent=2, ensure_ascii=False) + "\n")
     elif not quiet:
         show_recognised(export.recognised)
-        say(f"Read as: {example(export)}")
+        say(f"Read: {amounts(export)}; the first {example(export)}")
         say("Another column: --column x_mm=3. The answers for the next export of this kind: --save-as NAME")
     if out is not None:
         write_recording(file, export, out)
@@ -256,13 +260,15 @@ def show_recognised(recognised: Recognition) -> None:
     show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
 
 
-def show_proposed(recognised: Recognition, example: str, places: Mapping[str, tuple[str, str]]) -> None:
+def show_proposed(recognised: Recognition | None, example: str, places: Mapping[str, tuple[str, str]]) -> None:
     """How lengths were read, and the question where their lines lie, as options of the command."""
-    show_recognised(recognised)
+    if recognised is not None:
+        show_recognised(recognised)
     asked = {name: own[0] or own[1] for name, own in places.items() if not own[0] or "?" in own[0]}
     lines = (f'--line "{name}={place}"' for name, place in asked.items())
     say(f"Read as: {example}")
-    say(f"Where they lie: {' '.join(lines)}, or --plan plan.csv where they were planned")
+    planned = ", or --plan plan.csv where they were planned" if recognised is not None else ""
+    say(f"Where they lie: {' '.join(lines)}{planned}")
 
 
 def show_imported(job: Job, *, silent: bool) -> None:

@@ -186,8 +186,10 @@ class Desk(DeskFolder):
 
     def artefact(self, request: WebRequest) -> WebPage:
         request.only(("draft",))
-        draft = self.drafts.read(request.text("draft"))
-        return page("desk/artefact.html", DESK, draft=draft, kinds=self.reader.ask("kinds"))
+        one = self.drafts.read(request.text("draft"))
+        found = self.reader.ask("read", path=one.export, keys=one.keys)
+        kinds = self.reader.ask("kinds")
+        return page("desk/artefact.html", DESK, draft=one, kinds=kinds, amounts=found["amounts"])
 
     def fields(self, request: WebRequest) -> WebPage:
         request.only(("draft", "kind"))
@@ -220,7 +222,7 @@ class Desk(DeskFolder):
             self.reader.ask("create", kind=kind, export=one.export, keys=one.keys, values=values, folder=folder)
         except CmmUqError as error:
             return self._fields(one, kind, error)
-        self.drafts.remember(one.values)
+        self.drafts.remember({**one.values, "kind": kind})
         self.drafts.delete(one)
         return to(jobs.JOB, name=folder)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.app.commands.jobs.exchange import lines_asked, placed_by_plan, proposed, remember, remembered_keys
+from cmm_uq.app.commands.jobs.exchange import amounts, lines_asked, placed_by_plan, proposed, remember, remembered_keys
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.points import Machine
@@ -64,13 +64,14 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
         "problem": None,
         "lines": {},
         "example": "",
+        "amounts": "",
         "facts": [],
     }
     recognised: Recognition | None = None
     try:
         table = imported(content, name, said)
         points_of(table.columns, table.lines.tolist(), name, Machine())
-        recognised, found["example"] = table.recognised, example(table)
+        recognised, found["example"], found["amounts"] = table.recognised, example(table), amounts(table)
         found["lines"] = {line: proposed(place) for line, place in table.places.items()}
     except CmmUqError as error:
         if (asked := lines_asked(error)) is not None:

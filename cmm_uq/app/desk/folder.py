@@ -109,6 +109,7 @@ class DeskFolder(Application):
             folder=folder,
             date=form.get("date", ""),
             not_measured=form.get("not_measured") == "yes",
+            facts={key: value for key, value in form.items() if "." in key},
         )
         self.drafts.delete(one)
         return to(jobs.JOB, name=folder)

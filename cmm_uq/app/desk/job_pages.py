@@ -65,7 +65,7 @@ _HERE = {
 }
 """What a remedy in words of job.toml is on this page."""
 _OF_ITEM = (
-    *("machine.", "artefact.", "job.customer", "job.address", "conformity.limit_um"),
+    *("machine.", "artefact.", "job.customer", "job.address", "conformity.limit_um", "conformity.mpe"),
     *("rated_conditions.", "test_uncertainty."),
 )  # facts of one thing, or one customer, which another must not get unseen
 
@@ -114,7 +114,8 @@ def fields_page(
     draft: Draft, kind: str, fields: list[dict[str, str]], last: Mapping[str, str], found: Mapping[str, Any] | None
 ) -> p.WebPage:
     """The dozen things that a job states, with what was filled in last; ``found``: what a check of them says."""
-    again = {key: value for key, value in last.items() if key.startswith(_OF_ITEM)}
+    of_item = _OF_ITEM if last.get("kind") == kind else (*_OF_ITEM, "conformity.")
+    again = {key: value for key, value in last.items() if key.startswith(of_item)}
     filled = draft.values if draft.values else {key: value for key, value in last.items() if key not in again}
     return p.page("desk/fields.html", DESK, draft=draft, kind=kind, fields=fields, filled=filled, again=again, last=last,
                   found=found)  # fmt: skip

@@ -23,14 +23,13 @@ from tomlkit.items import AbstractTable
 from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.jobs.check import Problem, check_job, in_lines
 from cmm_uq.app.commands.jobs.exchange import write_job_of_export
-from cmm_uq.app.commands.jobs.new import BUDGET, PLAN, job_id, job_of_export, kind_or_refused, known, titles, usual
-from cmm_uq.app.commands.parts.new import PART
+from cmm_uq.app.commands.jobs.new import job_id, job_of_export, kind_or_refused, known, usual
 from cmm_uq.app.desk.exports import keys_of
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of, value_of
 
 _PAIR = re.compile(r"\s*([-+−]?\d+(?:[.,]\d+)?)\s*(?:to|…|\.\.\.?|;|/|\s)\s*([-+−]?\d+(?:[.,]\d+)?)\s*")
-_COMMA = re.compile(r"[-+−]?\d+,\d+")
+_COMMA = re.compile(r"[-+−]?\d+,\d+(?:[eE][-+]?\d+)?")
 _LABELS = {
     "job.date": "Date of the measurement",
     "job.customer": "Customer",
@@ -66,17 +65,13 @@ _OF_CERTIFICATE = {
 }
 """What ISO/IEC 17025:2017, 7.8 asks for besides; a certificate without it is a draft."""
 _PAIRS = ("machine.travel_mm.x", "machine.travel_mm.y", "machine.travel_mm.z", "rated_conditions.temperature_c")
-LAID_OUT = (BUDGET, PART, PLAN)
 
 
 def kinds() -> list[list[str]]:
-    """Names and titles of kinds that an export can be a recording of."""
-    kind = known()
-    return [
-        [name, title]
-        for name, title in titles().items()
-        if name not in LAID_OUT and kind_or_refused(kind[name]).table.with_recording
-    ]
+    """Names of kinds that an export can be a recording of, what they measure, and what a set-up and its points are."""
+    kind = {name: kind_or_refused(one) for name, one in known().items()}
+    begun = {name: one.beginning(name) for name, one in kind.items() if one.table.with_recording}
+    return [[name, one.measured or one.title, one.numbering] for name, one in begun.items()]
 
 
 def _wanted(name: str) -> Iterator[tuple[str, Any]]:
@@ -136,13 +131,13 @@ def tables_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
         known = _schema_of(schema, dotted)
         known = known.get("properties", {}).get(dotted.rpartition(".")[2], known)
         plain = known.get("type") == "string" and known.get("format") != "date"
-        value = text if plain else value_of(_point(text))
+        value = text if plain else value_of(plain_number(text))
         if dotted in _PAIRS:
             if (pair := _PAIR.fullmatch(text)) is None:
                 raise CmmUqError(
                     f"{text!r} is no lowest and highest value", where=f"[{table}] {key}", fix='Write it as "0 to 700"'
                 )
-            value = [float(_point(one)) for one in pair.groups()]
+            value = [float(plain_number(one)) for one in pair.groups()]
         key, dot, axis = key.partition(".")
         tables.setdefault(table, {})
         if dot:
@@ -156,7 +151,7 @@ def tables_of(values: Mapping[str, str]) -> dict[str, dict[str, Any]]:
     return tables
 
 
-def _point(text: str) -> str:
+def plain_number(text: str) -> str:
     """A number with a decimal point, where it is one with a comma."""
     text = text.replace("−", "-")
     return text.replace(",", ".") if _COMMA.fullmatch(text) else text
@@ -178,8 +173,19 @@ def check_answers(kind: str, export: str, keys: Mapping[str, Any], values: Mappi
         }
         files = job_of_export(kind, tables, {path.name: content}, id="job")
         if not wrong.problems:
-            return _checked("job", files)
-    return {"problems": list(in_lines([Problem.of(one) for one in wrong.problems])), "warnings": [], "sound": False}
+            found = _checked("job", files)
+            return found | {"problems": [_for_form(text, kind) for text in found["problems"]]}
+    problems = [_for_form(text, kind) for text in in_lines([Problem.of(one) for one in wrong.problems])]
+    return {"problems": problems, "warnings": [], "sound": False}
+
+
+def _for_form(text: str, kind: str) -> str:
+    """A problem with where on the desk it is mended: the step after this, or the fields whose keys it names."""
+    if "[artefact.certificate] file" in text:
+        return f"{text}. Here: make the job, then drop the certificate on its page"
+    named = [one["label"] for one in fields(kind) if re.search(rf"\b{one['key'].rpartition('.')[2]}\b", text)]
+    unsaid = [f"“{label}”" for label in named if "_" in text and label.lower() not in text.lower()]
+    return f"{text}. Here: {', '.join(unsaid)}" if unsaid else text
 
 
 def _checked(name: str, files: Mapping[str, bytes], beside: Path | None = None) -> dict[str, Any]:

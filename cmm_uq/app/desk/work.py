@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
+import tomlkit
 
 from cmm_uq.analysis.diagnosis.location import residual_field
 from cmm_uq.app.commands.certificates.verify import verify
@@ -37,20 +38,39 @@ from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.verify.given import CHECKS
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import is_part
-from cmm_uq.jobs.tables.identification import MEASURED
+from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED
 
 
-def create_part(plan: str, certificate: str, folder: str, date: str, not_measured: bool) -> dict[str, Any]:
-    """Write the job of a part as ``cmm-uq new part --from`` does, with the machine's certificate in it."""
+def create_part(
+    plan: str, certificate: str, folder: str, date: str, not_measured: bool, facts: Mapping[str, str]
+) -> dict[str, Any]:
+    """Write the job of a part as ``cmm-uq new part --from`` does, with the machine's certificate in it.
+
+    facts : by dotted key, what is empty is not stated; those of a stylus are of each.
+    """
     target = Path(folder)
     check_empty(target)
     given: dict[str, dict[str, Any]] = {"job": {"date": value_of(date)}} if date else {}
     if not_measured:
         given[PART] = {"not_measured": ["*"]}
     machine = certificate_files(Path(certificate))
+    stated = {key: value_of(questions.plain_number(text.strip())) for key, text in facts.items() if text.strip()}
+    for dotted, value in stated.items():
+        table, _, key = dotted.partition(".")
+        if table != "stylus":
+            given.setdefault(table, {})[key] = value
     given["machine_state"] = {"certificate": Answers(machine=machine).certificate}
     name = job_id(target, given)
     files = part_of_drawing(Path(plan), given, id=name)
+    document = tomlkit.parse(files["job.toml"].decode())
+    for dotted, value in stated.items():
+        for one in document["stylus"] if dotted.startswith("stylus.") else ():
+            one[dotted.partition(".")[2]] = value
+    text = tomlkit.dumps(document)
+    if text.count(EXAMPLE) == 1:  # in the head alone: no figure is an example's
+        del document["job"]["origin"]
+        text = tomlkit.dumps(document)
+    files["job.toml"] = text.encode()
     return {"files": sorted(put_new(target, Owner("new", name, MEASURED), {**files, **machine}, (Path(plan),)))}
 
 

@@ -30,7 +30,7 @@ _TITLES = {"utf-8": "UTF-8", "utf-16": "UTF-16", "latin-1": "ISO 8859-1", "cp932
 _TITLES |= {f"cp{number}": f"Windows-{number}" for number in (1250, 1251, 1252, 949)}
 # two characters of Shift JIS after each other, as words of Japanese are; letters with accents in Windows-1252 are single
 _JAPANESE = re.compile(rb"(?:[\x81-\x9f][\x40-\x7e\x80-\xfc]){2}")
-_ACCENTED = re.compile(rb"[\xc0-\xff](?![\x80-\xff])")
+_ACCENTED = re.compile(rb"(?<![\x81-\x9f])[\xc0-\xff](?![\x80-\xff])")
 # letters within words that are none of one western language, but of Czech or Polish in Windows-1250
 _EASTERN = (re.compile("(?<=[a-z])(?:ø|(?=.*ø)[ìè])|ø(?=[a-z])"), re.compile("(?<=[^\\W\\d_])[³¹¿œ](?=[^\\W\\d_])"))
 _PAIRED = re.compile(rb"[\xa1-\xfe]{2}")  # of Chinese (GB 2312) and Korean (KS X 1001), which come in words

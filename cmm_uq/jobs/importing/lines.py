@@ -159,6 +159,13 @@ class AxisRun:
     targets: list[tuple[float, float, int]]
 
 
+class UnplacedRunsError(CmmUqError):
+    """Runs were read whole, and nothing says where their axes lie: ``names`` of these, and the first reading in words."""
+
+    names: Sequence[str] = ()
+    example = ""
+
+
 def placed_runs(
     runs: Sequence[AxisRun], keys: ImportKeys, where: str, facts: Sequence[Fact] = (), stated: Stated | None = None
 ) -> list[Sheet]:
@@ -171,8 +178,13 @@ def placed_runs(
     places = {**{axis: place for axis, (place, _) in stated.items()}, **keys.lines}
     for axis in axes:
         if axis not in places:
-            fix = f'Say it, with the place where its scale reads 0, in mm: lines = {{ "{axis}" = "along X from 0,200,300" }}'
-            raise CmmUqError(f"nothing says where line {axis!r} lies, along which was measured", where=where, fix=fix)
+            example = axis_place(axis)[1]
+            fix = f'Say it, with the place where its scale reads 0, in mm: lines = {{ "{axis}" = "{example}" }}'
+            problem = f"nothing says where line {axis!r} lies, along which was measured"
+            error, (target, deviation, _) = UnplacedRunsError(problem, where=where, fix=fix), runs[0].targets[0]
+            error.names = [one for one in axes if one not in places]
+            error.example = f"axis {runs[0].axis}, run {runs[0].number}: {target:g} mm, {deviation:+.4g} µm"
+            raise error
     for run in runs:
         start, direction = place_of(places[run.axis])
         measurement, first = axes.index(run.axis) + 1, 0 if run.way >= 0 else len(run.targets)
@@ -211,7 +223,8 @@ class _Runs:
 
     def _check(self, where: str) -> None:
         kind = self.facts.get("owner", "")
-        if not {kind.lower(), self.facts.get("filetype", "").lower()} & _LINEAR:
+        names = ["owner", "filetype"] + ["file type"] * ("renishaw" in kind.lower())  # else its owner is its kind
+        if not {self.facts.get(name, "").lower() for name in names} & _LINEAR:
             problem = f"holds a measurement of the kind {kind!r}, whose unit no public text says"
             raise CmmUqError(problem, where=where, fix="Export it as CSV, with reading_um or reading_arcsec")
         for name, count in (("target-count", len(self.targets)), ("run-count", len(self.runs))):
@@ -325,3 +338,14 @@ def _axis_of(sheets: Sequence[Sheet]) -> str:
     """The axis that the first texts of a file name."""
     texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
     return next(filter(None, map(axis_in, texts)), "1")
+
+
+_AXIS_NAMES = "XYZ"
+
+
+def axis_place(name: str) -> tuple[str, str]:
+    """Where an axis of runs lies, as far as its name says, and an example: it reads 0 where it lies at 0."""
+    axis = name if name in _AXIS_NAMES else ""
+    known = ",".join("0" if one == axis else "?" for one in _AXIS_NAMES)
+    begins = ",".join("0" if one == (axis or "X") else str(100 * k) for k, one in enumerate(_AXIS_NAMES, 1))
+    return f"along {axis} from {known}" if axis else "", f"along {axis or 'X'} from {begins}"

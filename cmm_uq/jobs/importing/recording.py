@@ -39,8 +39,19 @@ from cmm_uq.jobs.importing.format import (
     length_named,
     sheets_of,
 )
-from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of, names_axes, no_header
-from cmm_uq.jobs.importing.lines import COLUMNS, MeasuredLengths, axis_runs, placed, placed_runs
+from cmm_uq.jobs.importing.header import (
+    LINES_BEFORE,
+    POINTS,
+    REFERENCES,
+    Header,
+    header_of,
+    names_axes,
+    no_header,
+    plain_words,
+    without_unit,
+    words_of,
+)
+from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, axis_runs, placed, placed_runs
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
 from cmm_uq.jobs.machines import coordinates, required_columns
@@ -184,9 +195,24 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
 def imported_references(content: bytes, where: str, keys: FileKeys) -> ImportedTable:
     """Certified values in any format that is known: distances or places, by the number of their point."""
     every = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
-    table = _imported(content, where, every, REFERENCES, None)
+    try:
+        table = _imported(content, where, every, REFERENCES, None)
+    except NotReadError as error:
+        lengths = _lengths_headed(_sheets_of(format_of(content, where), content, where, every))
+        if len(lengths) != 1 or every.columns.keys() & {"reference_mm"}:
+            problem, fix = ((text or "").replace("x_mm", "reference_mm", 1) for text in (error.problem, error.fix))
+            raise NotReadError(problem, where=error.where, fix=fix) from None
+        taken = every.model_copy(update={"columns": {**every.columns, "reference_mm": lengths.pop()}})
+        table = _imported(content, where, taken, REFERENCES, None)
     columns = {f"reference_{name}" if name in COORDINATES else name: values for name, values in table.columns.items()}
     return replace(table, columns=columns)
+
+
+def _lengths_headed(sheets: Sequence[Sheet]) -> set[str]:
+    """Headings that say a length and no more: on a certificate the certified one."""
+    words = words_of("lengths")["length"]
+    texts = (cell for sheet in sheets for row in sheet.rows[:LINES_BEFORE] for cell in row if isinstance(cell, str))
+    return {text for text in texts if " ".join(plain_words(without_unit(text.replace("_", " "))[0])) in words}
 
 
 def _imported(
@@ -351,12 +377,18 @@ def header(content: bytes) -> list[str]:
 
 def example(read: ImportedTable | Sequence[MeasuredLengths]) -> str:
     """What was read first, in words: ``line 1, run 1: 120 mm measured as 120.0012 mm, +1.2 µm``."""
-    if isinstance(read, ImportedTable):
+    if not isinstance(read, ImportedTable):
+        of_line, measured, nominal = f"line {read[0].names[0]}, ", read[0].measured[0], read[0].reference[0]
+        run = read[0].repeat[0]
+    elif "length_mm" not in read.recognised.columns:
         first = {name: values[0] for name, values in read.columns.items()}
         numbers = " ".join(f"{name} {first[name]:g}," for name in WHOLE if name in first)
         return f"{numbers} {', '.join(f'{name[0]} {first[name]:.4f} mm' for name in COORDINATES)}"
-    one, measured, nominal = read[0], read[0].measured[0], read[0].reference[0]
+    else:  # two points a length
+        xyz, reference = np.diff([read.columns[name][:2] for name in COORDINATES]), read.columns.get(REFERENCE)
+        of_line, measured, run = "", float(np.linalg.norm(xyz)), read.columns["repeat"][0]
+        nominal = None if reference is None else float(reference[1])
     of, error = "", ""
     if nominal is not None:
         of, error = f"{nominal:.4f} mm measured as ", f", {1000 * (measured - nominal):+.4g} µm"
-    return f"line {one.names[0]}, run {one.repeat[0]}: {of}{measured:.4f} mm{error}"
+    return f"{of_line}run {run:g}: {of}{measured:.4f} mm{error}"

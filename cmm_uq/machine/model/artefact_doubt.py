@@ -16,11 +16,13 @@ measures them.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, PPM, REFERENCE_TEMPERATURE
@@ -290,7 +292,8 @@ def faults(
     if axes * len(body.places) <= MOST_ERRORS and deformations(own).shape[1]:
         yield PATTERN.made(own)
     for fault in geometry:
-        yield fault.made(own)
+        with suppress(CmmUqError):  # it needs the travel of an axis, which the job does not give
+            yield fault.made(own)
     yield from temperatures(own, known.kelvin_weight)
     extents = np.linalg.svd(body.about_middle(), compute_uv=False)
     if axes == len(extents) and len(body.places) > axes and extents[2] < _FLAT * extents[1]:

@@ -47,6 +47,7 @@ class Beginning:
     machine: Mapping[str, Any] = field(default_factory=dict)  # keys of ``[machine]`` that name them
     noise_um: float = 0.5  # standard deviation of the readings of the first recording
     command: str = "report"  # that serves such a job
+    measured: str = ""  # what an export is of, where the title says the first recording's set-ups
 
 
 # ``[machine]`` of a new job of any kind

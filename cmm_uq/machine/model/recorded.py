@@ -38,8 +38,12 @@ def columns_needed(points: Points, names: tuple[str, ...], of: str, where: str |
     """Recorded columns (n, j) without which this kind of artefact says nothing."""
     for name in names:
         if name not in points.columns:
-            raise CmmUqError(f"no column {name!r}, which the recording of a {of} needs", where=where or "recording",
-                             fix=f"Add the column {name}, or mend [artefact] kind in job.toml")  # fmt: skip
+            fix = f"Add the column {name}, or mend [artefact] kind in job.toml"
+            if name.startswith("reference_"):
+                fix = f"Give its certificate, a DCC or a table of its points, as [artefact.certificate] file. Or a{fix[1:]}"
+            raise CmmUqError(
+                f"no column {name!r}, which the recording of a {of} needs", where=where or "recording", fix=fix
+            )
     return np.column_stack([points.columns[name] for name in names])
 
 

@@ -195,6 +195,16 @@ def test_keys_within_tables_are_set_and_the_certificate_is_laid_beside_the_expor
     assert (tmp_path / "job" / "gauge.csv").read_bytes() == certificate.read_bytes()
 
 
+def test_all_that_is_missing_is_told_at_once(tmp_path: Path) -> None:
+    export = str(ROOT / "docs" / "tutorial" / "ballbar-export.xlsx")
+    named = ["--machine", "CMM 3", "--set", "job.date=2026-05-31"]
+    for options, missing in (([], ("--machine", "job.date")), (named, ("artefact.blocks_mm", "artefact.cylinders_mm"))):
+        ended = run("new", "triangle", "my-job", "--from", export, *options, cwd=tmp_path)
+        assert ended.returncode == 2
+        assert all(one in ended.stderr for one in missing), ended.stderr
+    assert not (tmp_path / "my-job").exists()
+
+
 def test_a_value_and_a_key_within_it_are_refused(tmp_path: Path) -> None:
     both = ("--set", "artefact.certificate.number=7", "--set", "artefact.certificate={ date = 2026-01-02 }")
     ended = run("new", "sphere", *both, cwd=tmp_path)

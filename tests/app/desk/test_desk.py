@@ -243,9 +243,12 @@ def test_a_folder_that_cannot_be_new_is_told_and_nothing_is_lost(worked: Visitor
 
 def test_what_was_filled_in_last_is_there_the_next_time(worked: Visitor) -> None:
     draft = draft_of(worked, EXPORT.read_bytes(), EXPORT.name)
-    page = worked.get(f"/desk/fields?draft={draft}&kind=step_gauge").text
+    page = worked.get(f"/desk/fields?draft={draft}&kind=ballbar").text
     assert re.search(r'name="conformity.standard"[^>]*value="[A-Z]', page), "how the laboratory works is filled in"
-    for key in ("machine.name", "artefact.U_um"):  # what another machine or artefact has is offered alone
+    assert re.search(r'name="conformity.limit_um"[^>]*value=""', page), "the limit of another machine is not"
+    page = worked.get(f"/desk/fields?draft={draft}&kind=step_gauge").text
+    # what another machine, artefact or kind of measurement has is offered alone
+    for key in ("machine.name", "artefact.U_um", "conformity.standard"):
         assert re.search(rf'name="{key}"[^>]*value=""', page)
         assert re.search(rf'<datalist id="[^"]*-{key}-again"><option value="[^"]', page)
     assert "The last time: CMM 3" in page

@@ -15,6 +15,7 @@ from cmm_uq.app.desk.place import plans_in
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import imported
 from tests.jobs.importing.laboratory import EXPORTS
+from tests.jobs.importing.test_interferometer import written
 
 
 def laid_out(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
@@ -170,3 +171,27 @@ def test_a_row_for_each_coordinate_is_shown_as_points(tmp_path: Path) -> None:
     found = read(str(export), {})
     assert [meaning for _, meaning in found["columns"]] == ["measurement", "point", "x_mm", "y_mm", "z_mm"]
     assert found["rows"][1][1] == ["1", "1", "1.5", "2.5", "-3.5"]
+
+
+def test_where_runs_lie_is_asked_with_what_their_axis_says(tmp_path: Path) -> None:
+    path = tmp_path / "x.rtl"
+    path.write_text(written(), encoding="utf-8")
+    asked = read(str(path), {})
+    assert asked["lines"] == [("X", "along X from 0,?,?", "along X from 0,200,300")]
+    assert asked["example"] == "axis X, run 1: 0 mm, +0 µm"
+    whole = read(str(path), {"lines": {"X": "along X from 0,200,300"}})
+    assert whole["problem"] is None
+    assert whole["amounts"] == "1 set-up, 12 points in each, 1 repeat"
+
+
+def test_how_much_was_read_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = "".join(
+        f"{m};{ball};{run};{100 * m + ball};{run / 1000};5\n" for m in (1, 2) for run in (1, 2) for ball in (1, 2, 3)
+    )
+    path.write_text("Position;Ball;Repeat;X [mm];Y [mm];Z [mm]\n" + rows + "3;1;1;7;8;9\n", encoding="utf-8")
+    assert read(str(path), {})["amounts"] == "3 set-ups, 1 to 3 points in each, 1 to 2 repeats"
+    lengths = "".join(f"{line};{n};{n}.001;{n}.002\n" for line in "AB" for n in (100, 250, 400, 550, 700))
+    path.write_text("Line;Nominal (mm);Run 1 (mm);Run 2 (mm)\n" + lengths, encoding="utf-8")
+    lines = {"A": "along X from 0,0,0", "B": "along Y from 0,0,0"}
+    assert read(str(path), {"lines": lines})["amounts"] == "10 lengths, 2 runs"

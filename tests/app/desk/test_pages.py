@@ -18,7 +18,8 @@ from cmm_uq.base.messages import Verbatim
 from cmm_uq.jobs.verdicts import Verdict, Verdicts
 
 READ: dict[str, Any] = {
-    "problem": ["x", "cannot say", "points_per_measurement = N"], "lines": [], "example": "", "sheets": ["a", "b"],
+    "problem": ["x", "cannot say", "points_per_measurement = N"], "lines": [], "example": "", "amounts": "",
+    "sheets": ["a", "b"],
     "columns": [["X", "x_mm"], ["", "unknown"], ["n", "name"], ["t", "of another package"]], "more": 5, "command": "",
     "rows": [[1, ["X", "", "n", "t"], True], [2, ["1", "2", "<b>", "4"], False]], "facts": [["<b>", "b"]],
 }  # fmt: skip

@@ -51,6 +51,8 @@ def test_a_part_passes_or_fails_from_its_plan_and_its_points(calibrated: Visitor
     certificate = page.partition('<option value="reports/')[2].partition('"')[0]
     assert certificate.endswith(MACHINE.name)
     given = {"draft": draft, "folder": "plate-7", "certificate": f"reports/{certificate}", "date": "2026-03-02"}
+    stated = {"part.cte_per_k": "11,5e-6", "part.u_cte_per_k": "0.5e-6", "stylus.u_diameter_um": "0.3"}
+    given |= stated | {"environment.u_part_k": "0.1", "environment.u_scales_k": "0.1", "form.field_um": "1"}
     refused = calibrated.post("/desk/part", **{**given, "certificate": "../x.pdf"})
     assert refused.status == 409
     answer = calibrated.post("/desk/part", **given)

@@ -39,8 +39,8 @@ def test_a_line_with_blanks_in_its_name_makes_a_job_that_can_be_read(
 def test_every_kind_of_an_export_has_a_picture_and_its_dozen() -> None:
     found = kinds()
     drawn = (template_folder() / "serve" / "drawings.html").read_text(encoding="utf-8")
-    assert [name for name, _ in found if f'kind == "{name}"' not in drawn] == []
-    for name, _ in found:
+    assert [name for name, *_ in found if f'kind == "{name}"' not in drawn] == []
+    for name, *_ in found:
         asked = fields(name)
         assert 4 <= len([one for one in asked if not one["further"]]) <= 24, name
         assert len({one["key"] for one in asked}) == len(asked)
@@ -110,3 +110,22 @@ def test_a_job_names_no_effect_that_its_export_cannot_tell(tmp_path: Path, monke
     text = (tmp_path / "K-3" / "job.toml").read_text(encoding="utf-8")
     assert "scale_x" in text
     assert "hysteresis" not in text
+
+
+def test_a_problem_says_where_on_the_desk_it_is_mended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"1;{ball};{100 * ball};2;{3 + ball / 1000}\n" for ball in (1, 2, 3, 4))
+    (tmp_path / "a.csv").write_text("Position;Ball;X [mm];Y [mm];Z [mm]\n" + rows, encoding="utf-8")
+    answers = {"job.date": "2026-05-31", "machine.name": "CMM 3"}
+    (problem,) = check_answers("plate", "a.csv", {}, answers)["problems"]
+    assert "drop the certificate on its page" in problem
+    (problem,) = check_answers(
+        "sphere", "a.csv", {}, {**answers, "conformity.standard": "ISO 10360-5:2010", "conformity.limit_um": "4"}
+    )["problems"]
+    assert "“Form deviation of the sphere by its certificate, µm”" in problem
+
+
+def test_the_artefact_is_said_of_any_recording() -> None:
+    told = {name: (text, numbering) for name, text, numbering in kinds()}
+    assert told["step_gauge"][0] == "Step gauge or ball beam: points on a line"
+    assert all(text and "measurement" in numbering for text, numbering in told.values())

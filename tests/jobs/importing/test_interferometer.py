@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.app.commands.jobs.exchange import lines_asked
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.lines import axis_place
 from cmm_uq.jobs.importing.recording import ImportedTable, imported
 
 TARGETS = [0.0, 100.0, 200.0, 300.0, 400.0, 500.0]
@@ -82,3 +84,13 @@ def test_where_the_axis_lies_is_asked_for() -> None:
     with pytest.raises(CmmUqError, match="nothing says where line 'X' lies") as error:
         read(written(), ImportKeys())
     assert "along X from 0,200,300" in error.value.fix
+    asked = {"X": ("along X from 0,?,?", "along X from 0,200,300")}
+    assert lines_asked(error.value) == (None, "axis X, run 1: 0 mm, +0 µm", asked)
+    assert axis_place("Z")[1] == "along Z from 100,200,0"
+
+
+def test_a_file_of_the_maker_says_its_kind_by_its_type_else_by_its_owner() -> None:
+    assert len(read(written(owner="Renishaw")).lines) == len(read(written()).lines)
+    for other in (written(owner="Angular"), written(owner="Renishaw").replace(": rtl", ": rta")):
+        with pytest.raises(CmmUqError, match="whose unit no public text says"):
+            read(other)

@@ -7,6 +7,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
+from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example, imported, points_of
 from tests.jobs.importing import laboratory, unseen
@@ -71,6 +72,35 @@ def test_a_line_is_said_by_its_start_and_an_axis_or_by_two_places() -> None:
         read("", lines={"1": "somewhere"})
     with pytest.raises(CmmUqError, match="has no line 'upper'"):
         read("Nominal (mm);Measured (mm)\n100;100.002\n", lines={**LINE["lines"], "upper": "along X from 0,0,0"})
+
+
+@pytest.mark.parametrize(("start", "end"), [("von", "nach"), ("van", "naar"), ("fra", "til"), ("from", "to")])
+def test_a_title_that_says_start_and_end_places_its_line(start: str, end: str) -> None:
+    titles = ((1, "X", "(50; 500; 300)", "(950; 500; 300)"), (2, "Y", "(450; 80; 300)", "(450; 1100; 300)"))
+    rows = [row for i, axis, a, b in titles for row in (
+        f"Lage {i}: parallel {axis} {start} {a} {end} {b} mm,,", "Nr.,Nominal [mm],Measured [mm]",
+        *(f"{n},{100 * n + 300},{100 * n + 300}.00{n}" for n in range(1, 6)), "",
+    )]  # fmt: skip
+    table = read("\n".join(rows))
+    assert [table.columns[name][:2].tolist() for name in COORDINATES] == [[50.0, 450.001], [500.0] * 2, [300.0] * 2]
+    assert table.columns["y_mm"][10] == 80.0
+    assert example(table) == "run 1: 400.0000 mm measured as 400.0010 mm, +1 µm"
+
+
+def test_planned_places_of_both_balls_are_where_a_line_lies() -> None:
+    heads = "Posição,Valor do padrão (mm),Medição,Esfera 1,,,Esfera 2,,,Comprimento medido (mm),Erro (µm)\n"
+    heads += ",,,X nom. (mm),Y nom. (mm),Z nom. (mm),X nom. (mm),Y nom. (mm),Z nom. (mm),,\n"
+    rows = "".join(
+        f"{i},{of}.0127,{run},{place},{of}.01{10 + 3 * i + run},{(3 * i + run) / 10 - 1.7:.1f}\n"
+        for i, (of, place) in enumerate((
+            (400, "150,400,-400,550,400,-400"), (400, "400,150,-400,400,550,-400"), (400, "400,400,-620,400,400,-220"),
+            (800, "100,420,-380,900,420,-380"), (800, "430,90,-380,430,890,-380"), (800, "160,140,-610,689,637,-273"),
+        ), 1)
+        for run in (1, 2, 3)
+    )  # fmt: skip
+    table = read(heads + rows)
+    assert table.columns["x_mm"][::6].tolist() == [150.0, 400.0, 400.0, 100.0, 430.0, 160.0]
+    assert table.columns["z_mm"][13] == pytest.approx(-219.99, abs=0.02)
 
 
 @pytest.mark.parametrize(("table", "question"), [

@@ -320,6 +320,12 @@ def test_a_japanese_table_is_read_in_shift_jis_as_in_utf_8() -> None:
     assert shift_jis.recognised.columns == utf_8.recognised.columns
 
 
+def test_japanese_names_of_a_character_and_a_number_are_shift_jis() -> None:
+    rows = "".join(f"  {i}  点  面{i:02d}  {40 * i}.0012  5.0003  7.0001\n" for i in range(40))
+    text = f"測定結果一覧\n番号  要素  名称  X座標  Y座標  Z座標\n{rows}"
+    assert decoded(text.encode("cp932"), "export.txt") == (text, "Shift JIS")
+
+
 WESTERN = [
     "Größe", "Länge", "Nennmaß", "Prüfkörper", "mesuré", "répétition", "Línea", "Répétabilité", "à", "Åsa", "Größen–Liste",
     "100–200", "µm", "±0,5", "„Zitat“", "«écart»", "a–b", "‘x’", "…", "naïve", "Ø12", "20", "°C",

@@ -128,6 +128,15 @@ def test_a_derived_recording_has_the_certified_values_in_it() -> None:
     assert (derived.facts.artefact.certificate.number, derived.facts.artefact.certificate.file) == ("7", None)
 
 
+@pytest.mark.parametrize("heading", ["distance_mm", "Length [mm]", "Abstand (mm)", "長さ (mm)"])
+def test_a_length_on_a_certificate_is_the_certified_one(heading: str) -> None:
+    rows = "".join(f"{i},{value}\n" for i, value in enumerate((0, 20.00013, 40.00008, 60.00031), 1))
+    found = job(GAUGE, "certificate.csv", f"ball,{heading}\n{rows}")
+    assert found.points.columns["reference_mm"].tolist() == [0, 20.00013, 40.00008, 60.00031] * 2
+    with pytest.raises(CmmUqError, match="no column is reference_mm among 'ball', 'nominal_mm'"):
+        job(GAUGE, "certificate.csv", f"ball,nominal_mm\n{rows}")
+
+
 @pytest.mark.parametrize(
     ("recording", "certificate", "kind", "message"),
     [

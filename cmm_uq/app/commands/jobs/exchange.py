@@ -22,6 +22,7 @@ from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.importing.answers import as_file, folder, matching, path_of
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
 from cmm_uq.jobs.importing.lengths.places import proposed as proposed
+from cmm_uq.jobs.importing.lines import UnplacedRunsError, axis_place
 from cmm_uq.jobs.importing.recording import (
     ImportedTable,
     UnplacedError,
@@ -65,16 +66,33 @@ def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
     return found
 
 
-def lines_asked(error: CmmUqError) -> tuple[Recognition, str, dict[str, tuple[str, str]]] | None:
-    """How lengths were read of which nothing says where they lie: the reading, its first in words, the lines by name.
+def lines_asked(error: CmmUqError) -> tuple[Recognition | None, str, dict[str, tuple[str, str]]] | None:
+    """How lengths or runs were read of which nothing says where they lie: the reading, its first in words, lines by name.
 
     Of each line its place as far as the file says it, with ? for what it leaves open, and an example of one.
     """
+    if isinstance(error, UnplacedRunsError):
+        return None, error.example, {name: axis_place(name) for name in error.names}
     if not isinstance(error, UnplacedError):
         return None
     places = {name: place for one in error.lengths for name, (place, _) in one.places.items()}
     every = dict.fromkeys(name for one in error.lengths for name in one.names)
     return error.recognised, example(error.lengths), {name: proposed(places.get(name, "")) for name in every}
+
+
+def amounts(read: ImportedTable) -> str:
+    """How many of what were read, so that a reading that lost some is seen: ``4 set-ups, 3 points in each, 3 repeats``."""
+    each = np.column_stack([read.columns.get(name, np.ones(len(read.lines))) for name in ("measurement", "point")])
+    places, repeats = np.unique(each, axis=0, return_counts=True)
+    points = np.unique(places[:, 0], return_counts=True)[1]
+    if "lines" in {fact.key for fact in read.recognised.facts} and "length_mm" in read.recognised.columns:
+        return f"{len(points)} lengths, {_counted(repeats, 'run')}"
+    return f"{_counted([len(points)], 'set-up')}, {_counted(points, 'point')} in each, {_counted(repeats, 'repeat')}"
+
+
+def _counted(counts: Any, what: str) -> str:
+    least, most = int(min(counts)), int(max(counts))
+    return f"{most if least == most else f'{least} to {most}'} {what}{'' if most == 1 else 's'}"
 
 
 def placed_by_plan(export: Path, keys: ImportKeys, plan: Path) -> ImportKeys:
