@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LOGO_BYTES, LOGO_ELEMENTS, LOGO_PIXELS
-from cmm_uq.jobs.importing.encodings import local, root_of
+from cmm_uq.jobs.importing.cells.encodings import local, root_of
 from cmm_uq.jobs.tables.identification import Laboratory
 
 if TYPE_CHECKING:

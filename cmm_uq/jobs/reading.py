@@ -18,8 +18,8 @@ from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.derived_job import files_of, prediction_of
+from cmm_uq.jobs.importing.cells.encodings import begins_with
 from cmm_uq.jobs.importing.documents import DCC
-from cmm_uq.jobs.importing.encodings import begins_with
 from cmm_uq.jobs.importing.format import HEAD, Recognition
 from cmm_uq.jobs.importing.recording import read_recording_file
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of
-from cmm_uq.jobs.importing.encodings import is_number
+from cmm_uq.jobs.importing.cells.encodings import is_number
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, format_of
 from cmm_uq.jobs.importing.header import LINES_BEFORE, text_of
 

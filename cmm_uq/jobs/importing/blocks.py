@@ -15,11 +15,11 @@ from itertools import pairwise
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.cells.figures import figure, sign_of, unit_of
 from cmm_uq.jobs.importing.factors import LINE, RUN, hint
 from cmm_uq.jobs.importing.format import (
     LENGTH,
     UNITS,
-    Cell,
     NotReadError,
     Sheet,
     Sources,
@@ -28,58 +28,23 @@ from cmm_uq.jobs.importing.format import (
     sources_of,
     unit_named,
 )
-from cmm_uq.jobs.importing.header import named_alike, without_unit
+from cmm_uq.jobs.importing.header import WORD, named_alike, plain_words, words_of
 from cmm_uq.jobs.importing.lengths.places import END, START, role_among, said_in, without_place
 
-_FIGURE = re.compile(r"[±<>≤≥~]?\s*([+-]?\d[\d .,'’]*|[+-]?[.,]\d+)(?:[eE][+-]?\d+)?")
-_GROUPS = {sign: re.compile(rf"(?<=\d)[{other} '’](?=\d{{3}})") for sign, other in ((",", "."), (".", ","))}
-_PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _RULE = re.compile(r"[-=_*+|.\s]*")
 DATED = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}|\d:\d\d|年")
 _PRINTED = re.compile(r"\d[.,]\d")
-_DECIMAL = re.compile(r"^[^\d]*\d+[.,]\d+\D*$")
-_SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*(\w+)", re.IGNORECASE)
-_MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
 _FORMULA = re.compile(r"(?<=\S)\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
-SMALL = ("um", "nm", "microinch")  # units of deviations
 DEEPEST = 4  # rows of a head
+_TITLES = 3  # between a head and its figures, at most
 _AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012]?(?![^\W_]))", re.IGNORECASE)
 _ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?0(?!\w)")
 _MEASURED = 0.05  # figures printed finer are no planned places
-_POWER = 99  # of ten, beyond which a text is no figure
-WORD = re.compile(r"[^\W\d_]+")
-
-
-def figure(cell: Cell, sign: str) -> tuple[float, float] | None:
-    """Value of a cell and the step of its last digit; ``None`` where it is no number."""
-    if not isinstance(cell, str):
-        text = f"{cell:.9f}".rstrip("0")
-        return float(cell), 10.0 ** -len(text.partition(".")[2])
-    text = cell.replace("−", "-").replace("\u00a0", " ").replace("\u202f", " ").strip()
-    if (own := apart(text.lstrip("±<>≤≥~ "))) is not None:
-        text = own[0].strip()
-    if not _FIGURE.fullmatch(text):
-        return None
-    text = _GROUPS[sign].sub("", text.lstrip("±<>≤≥~ "))
-    text = text.replace(",", ".") if sign == "," else text
-    if not _PLAIN.fullmatch(text):
-        return None
-    mantissa, _, power = text.lower().partition("e")
-    if abs(int(power[:5] or 0)) > _POWER or not np.isfinite(value := float(text)):
-        return None
-    return value, 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
 
 
 def heading(path: Sequence[str]) -> str:
     return " ".join(dict.fromkeys(" ".join(text.split()) for text in path if text))
-
-
-def sign_of(rows: Sequence[Sequence[Cell]]) -> str:
-    """The decimal sign that most figures of a sheet show."""
-    texts = (cell for row in rows for cell in row if isinstance(cell, str) and _DECIMAL.match(cell) and len(cell) < 24)
-    counts = Counter("," if text.rfind(",") > text.rfind(".") else "." for text in texts)
-    return "," if counts[","] > counts["."] else "."
 
 
 @dataclass
@@ -144,9 +109,12 @@ class CutSheet:
 
     def other_quantity(self, row: int) -> bool:
         """Whether a row names a unit that is none of lengths."""
-        texts = ((self.text(row, k), own is None) for k, own in enumerate(self.figures[row]))
-        named = (unit_named(text) if bare else (apart(text) or ("", None))[1] for text, bare in texts)
-        return any(unit.sort != LENGTH for unit in named if unit is not None)
+        return any(self._of_another(row, k) for k in range(len(self.figures[row])))
+
+    def _of_another(self, row: int, k: int) -> bool:
+        text = self.text(row, k)
+        unit = unit_named(text) if self.figures[row][k] is None else (apart(text) or ("", None))[1]
+        return unit is not None and unit.sort != LENGTH
 
     def unit_beside(self, rows: Sequence[int]) -> WrittenUnit | None:
         """The unit that a column names in every row."""
@@ -198,8 +166,9 @@ class CutSheet:
         if not numbers or self._place_within(i, numbers, beside):
             return "text"
         counted = len(filled) == 2 and numbers == filled[1:] and (self.figures[i][filled[1]] or (0, 0))[1] >= 1
-        if counted and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN):
-            return "text"  # as Position;1 above a block
+        turned = numbers[0] > filled[0] and all(self._of_another(i, k) for k in numbers)
+        if (counted or turned) and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN):
+            return "text"  # as Position;1 above a block, or Position 1 | 90 deg
         if self._is_head(i) and i + 1 < len(self.sheet.rows):
             units = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i + 1] if cell != ""]
             below = i + 1 + (len(units) == 1 and i + 2 < len(self.sheet.rows))  # below a title
@@ -236,7 +205,10 @@ class CutSheet:
             if head or block is None:
                 if block is not None:
                     yield block
-                block = Block(self._paths(head), number=1 if block is None else block.number + 1, head=head)
+                paths, number = self._paths(head), 1 if block is None else block.number + 1
+                if block is not None and paths == block.paths and any(_counts_pages(self.line(k)) for k in above):
+                    number = block.number  # it goes on
+                block = Block(paths, number=number, head=head)
             block.above += above
             block.rows.append(i)
             block.titles[i] = titles
@@ -264,6 +236,11 @@ class CutSheet:
                 block.titles = {row: {**own, **titles} for row, own in block.titles.items()}
                 block.head = block.head[-kept:]
                 block.paths = self._paths(block.head)
+        before, last = dict[str, str](), dict[str, str]()
+        for block in blocks:  # titles of a head hold on
+            for row, own in block.titles.items():
+                last |= {key: text for key, text in own.items() if before.get(key) != text}
+                block.titles[row], before = {**own, **last}, own
         return blocks
 
     def _place_columns(self, block: Block) -> dict[str, list[int]]:
@@ -330,6 +307,8 @@ class CutSheet:
         pairs = _PAIRS.split(text)
         parts = pairs if all(":" in pair for pair in pairs) else [text]
         parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
+        if any(_counts_pages(part) for part in parts):
+            return {}
         titles = {(_begun(first[0]) if (first := WORD.search(part)) else part): part for part in parts}
         return {**titles, "": text} if placed or (len(cells) == 1 and text not in self._always) else titles
 
@@ -338,8 +317,10 @@ class CutSheet:
         head: list[int] = []
         for row in reversed(pending):
             filled = [k for k, cell in enumerate(self.sheet.rows[row]) if cell != ""]
-            if not head and filled == [0] and len(numbers) > 1:
-                continue  # a title below its head
+            if not head and filled == [0] and len(numbers) > 1:  # a title below its head
+                if pending[-1] - row < _TITLES:
+                    continue
+                break
             between = range(self.sheet.lines[row] + 1, self.sheet.lines[head[0]] if head else 0)
             texts = [self.text(row, k) for k in filled]
             odd = any(
@@ -373,28 +354,11 @@ class CutSheet:
         return [[level[k] for level in levels] for k in range(self.width)]
 
 
+def _counts_pages(text: str) -> bool:
+    words = plain_words(text)
+    return any(a in words_of("rows")["page"] and b.isdigit() for a, b in pairwise(words))
+
+
 def _begun(word: str) -> str:
     """How a title begins; all letters of axes alike."""
     return word.casefold() if len(word) > 1 or not word.isascii() else "x"
-
-
-def unit_of(path: Sequence[str]) -> WrittenUnit | None:
-    """The unit in the texts above a column: the lowest one."""
-    for text in reversed(path):
-        if text and (unit := unit_named(text.strip("[]()<>{} ")) or without_unit(text.replace("\n", " "))[1]):
-            return unit
-    return None
-
-
-def unit_elsewhere(sheets: Sequence[Sheet], *, small: bool) -> WrittenUnit | None:
-    """The one unit of lengths, or of deviations, that the texts of a file say (``UNITS=IN``), else mention."""
-    cells = (cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str))
-    texts = {cell for cell in cells if not cell[:1].isdigit()}
-    said = {word for text in texts for word in _SAYS_UNIT.findall(text)}
-    mentioned = {word for text in texts for word in _MENTION.findall(text) if len(word) > 1 and word.casefold() != "in"}
-    for words in (said, mentioned):
-        units = [unit for unit in map(unit_named, words) if unit and unit.sort == LENGTH]
-        named = {unit.name for unit in units if (unit.name in SMALL) == small}
-        if len(named) == 1:
-            return UNITS[named.pop()]
-    return None

@@ -19,8 +19,8 @@ from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, sem
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.blocks import figure
-from cmm_uq.jobs.importing.encodings import decimal_sign, is_number, split_units, values_of
+from cmm_uq.jobs.importing.cells.encodings import decimal_sign, is_number, split_units, values_of
+from cmm_uq.jobs.importing.cells.figures import figure
 from cmm_uq.jobs.importing.factors import Label
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, NotReadError, Sheet, WrittenUnit
 from cmm_uq.jobs.importing.header import (
@@ -35,7 +35,7 @@ from cmm_uq.jobs.importing.header import (
     text_of,
 )
 from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
-from cmm_uq.jobs.importing.roles import said
+from cmm_uq.jobs.importing.roles import names_length, said
 
 LARGEST_MACHINE_MM = 40_000.0  # longest diagonal of a measuring machine: gantries of 30 m are the largest made
 SIGNS = {".": say("point"), ",": say("comma")}
@@ -119,7 +119,9 @@ def _refuse_lengths_along_axes(written: Written, place: str) -> None:
 def _refuse_places_of_lengths(written: Written, table: ExportTable, sign: str) -> None:
     """Whole places, beside which measured lengths stand, are where those begin, and were not measured."""
     used, headings = {i for own in table.header.columns.values() for i in own}, table.header.headings
-    beside = [i for i, head in enumerate(headings) if i not in used and said([head]) == "measured"]
+    beside = [
+        i for i, head in enumerate(headings) if i not in used and (said([head]) == "measured" or names_length([head]))
+    ]
     whole = all(np.all(values % 1 == 0) for axis in COORDINATES for values, _, _ in written.get(axis, ()))
     for i in beside if whole else ():
         if (first := figure(table.cells[i][0], sign)) and first[1] < 1 < first[0]:

@@ -14,7 +14,8 @@ from itertools import combinations, permutations
 import numpy as np
 
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.importing.blocks import SMALL, Block, CutSheet, figure, heading
+from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
+from cmm_uq.jobs.importing.cells.figures import SMALL, figure
 from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import without_unit
@@ -204,15 +205,15 @@ def _measured(triples: Sequence[Triple], where: str) -> tuple[list[Triple], int]
     """
     rest = [t for t in triples if not t.directed and np.ptp(t.values, axis=1).any()]
     wide = [t for t in rest if t.wide]
-    one_place = [t for t in rest if len(t.columns) == 1 and np.nanmax(np.abs(t.values)) > _WIDE]  # measured again
+    one_place = [t for t in rest if 1 in (len(t.columns), len(t.values)) and np.nanmax(np.abs(t.values)) > _WIDE]
     large = wide or one_place
-    nominal, confirmed = set[Triple](), set[Triple]()
+    nominal, confirmed, deviating = set[Triple](), set[Triple](), set[Triple]()
     for a, b in permutations(large, 2):
         told = (b.role in _EXACT) - (a.role in _EXACT)
         told = told or (a.role == "measured") - (b.role == "measured")
         if told >= 0 and {a, b}.isdisjoint(nominal) and a.near(b):
             others = [d for d in rest if d is not a and d is not b]
-            checks = any(a.minus(b, d) for d in others)
+            deviating |= (checks := {d for d in others if a.minus(b, d)})
             if told > 0 and not checks and any(b.minus(a, d) for d in others):
                 what = f"{a.shown} is called measured, and by the deviations {b.shown} is"
                 raise EitherError(what, where=where, fix=said_by("x_mm", a.columns[:1], ", and y_mm and z_mm"))
@@ -221,7 +222,7 @@ def _measured(triples: Sequence[Triple], where: str) -> tuple[list[Triple], int]
             rounder = rounder and a.several > _FEW and _COUNTED.sub("0", a.head) != _COUNTED.sub("0", b.head)
             if checks or told > 0 or rounder:
                 nominal.add(b)
-    left = [t for t in large if t not in nominal and t.role != "deviation"]
+    left = [t for t in large if t not in nominal | deviating and t.role != "deviation"]
     left = [t for t in left if t.role != "summary"] or [t for t in left if t in confirmed]
     if deviations := [t for t in rest if t.role == "deviation" and t not in large] if not nominal else []:
         left = [t for t in left if t.role not in _EXACT] or _summed(left, deviations, where)

@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import ROWS
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import UNITS as PRINTED
-from cmm_uq.jobs.importing.encodings import begins_with, local, root_of
+from cmm_uq.jobs.importing.cells.encodings import begins_with, local, root_of
 from cmm_uq.jobs.importing.format import LENGTHS, UNITS, Fact, Format, ImportKeys, Row, Sheet, length_named, sheets_of
 from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of
 

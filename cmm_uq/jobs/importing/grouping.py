@@ -39,7 +39,7 @@ _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball th
 # what speaks for a way, the strongest first
 _TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED, _AT_LEAST = 6.0, 5.0, 4.0, 3.0, 2.0, 1.0
 _APART = 3  # times what repeats scatter, which is more than drift
-_FEW = 3  # points, which may be anything
+_FEW, _SEVERAL = 3, 6  # points, which may be anything, and whose order alone says nothing
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,8 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
     if not found and place.max() + 1 == len(xyz) > _FEW and not any(way.rank for way in ways):
         return _told(Grouping(0.0, None, 0 * place, place, None), found, xyz)  # a list, and nothing else
+    if not plate and _copied(ways, xyz) and all(way.of is None or way.rank < _NAMED for way in ways):
+        return None  # names of points, which may be one artefact in several places
     ways = [
         way
         for way in ways
@@ -120,6 +122,18 @@ def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
             yield Label("", values, "part"), both, word
 
 
+def _a_chain(xyz: Floats) -> bool:
+    """Whether each place is as far from the next as any other, as on a ring or a row, so that any number of them is alike."""
+    return bool(np.ptp(np.linalg.norm(np.diff(xyz, axis=0), axis=1)) < _RIGID_MM)
+
+
+def _copied(ways: Sequence[Grouping], xyz: Floats) -> bool:
+    """Whether rows in turn come again elsewhere, and are no rows of a lattice."""
+    way = next((way for way in ways if way.rank and way.of and way.of[0].sort == "turn"), None)
+    first = xyz[way.measurement == 0] if way and way.measurement.max() > 1 else xyz[:1]
+    return len(first) > 2 and bool(np.linalg.svd(first - first.mean(axis=0), compute_uv=False)[1] > 1)
+
+
 def _in_turn(xyz: Floats) -> Iterator[Counted]:
     """Rows in turn, as many as may be a measurement."""
     for size in (size for size in range(2, len(xyz) // 2 + 1) if len(xyz) % size == 0):
@@ -142,7 +156,7 @@ def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Flo
         names = [f for f in found if fixes(at, f[1]) and together(measurement, f[1]).max() + 1 == each]
         names.sort(key=lambda f: (f[2] != POINT, f[1].max(), f[0].sort == "part"))
         again = [f for f in names if f[1].max() + 1 < each]  # names that begin again in each measurement
-        if each <= measurement.max() + 1 or (of is not None and of[0].sort == "turn" and each < 6):
+        if each <= measurement.max() + 1:
             continue
         own = measurement[first]
         points = again[0][1][first] if again else in_turn(own) - 1
@@ -153,6 +167,8 @@ def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Flo
             rank = 0.0  # names begin again at places that were there
         elif several:
             rank = _rank(of, shape, named=bool(names), again=again[0] if again else None) if of else 0.0
+            if of and of[0].sort == "turn":
+                rank = 0.0 if _a_chain(xyz[first]) else min(rank, _AT_LEAST) if each < _SEVERAL else rank
         else:
             rank = _NAMED if names or _on_a_ball(xyz[first]) else 0.0
         told.append(Grouping(rank, of, measurement, at, point))

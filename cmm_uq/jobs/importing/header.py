@@ -20,7 +20,7 @@ from pathlib import Path
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, READINGS, REQUIRED
-from cmm_uq.jobs.importing.encodings import is_number
+from cmm_uq.jobs.importing.cells.encodings import is_number
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, NotReadError, Sheet, WrittenUnit, sources_of, unit_named
 
 _LAST_SPACED = "\u2e7f"  # ahead of Chinese, Japanese and Korean characters
@@ -79,6 +79,7 @@ _LONGEST = 120  # characters of a heading; longer text is none
 COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGNORECASE)
 # what certificates print above a column, beside its unit or its coverage factor
 _SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
+WORD = re.compile(r"[^\W\d_]+")
 _FIGURES = frozenset("0123456789+-−.,")
 _BALL = "ball"  # column of scanned balls: which of its bar
 _OWN = frozenset((*REQUIRED, *OPTIONAL, *READINGS))
@@ -331,10 +332,21 @@ def is_summary(row: Sequence[Cell]) -> bool:
 
 
 def named_alike(rows: Sequence[Sequence[Cell]], of: Sequence[int]) -> int:
-    """How many rows come ahead of those, at the end, whose names have no number as all others have: results below points."""
+    """How many rows come ahead of those, at the end, whose names have no number as all others have: results below points.
+
+    Rows that a further word calls what those are go on.
+    """
     numbered = [any(map(str.isdigit, text_of(next((cell for cell in rows[i] if cell != ""), "")))) for i in of]
     count = sum(numbered)
-    return count if count > _FEW and all(numbered[:count]) else len(of)
+    if count <= _FEW or not all(numbered[:count]):
+        return len(of)
+    words = {word for i in of[:count] for word in _further_words(rows[i])}
+    return next((n for n in range(count, len(of)) if words.isdisjoint(_further_words(rows[of[n]]))), len(of))
+
+
+def _further_words(row: Sequence[Cell]) -> set[tuple[int, Cell]]:
+    words = (one for one in enumerate(row) if isinstance(one[1], str) and WORD.search(one[1]))
+    return {one for one in [*words][1:] if not unit_named(str(one[1]))}
 
 
 def shown(sheet: Sheet, i: int, why: str) -> str:

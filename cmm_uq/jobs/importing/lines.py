@@ -23,7 +23,7 @@ from cmm_uq.base.messages import Verbatim, say, semicolons
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.blocks import unit_elsewhere
+from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
 from cmm_uq.jobs.importing.factors import (
     RUN,
     codes,

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import compress
+from itertools import compress, zip_longest
 from pathlib import PurePath
 
 import numpy as np
@@ -24,9 +24,9 @@ from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest, misnamed
 from cmm_uq.jobs.importing.answers import head_of
-from cmm_uq.jobs.importing.blocks import SMALL
+from cmm_uq.jobs.importing.cells.encodings import is_number
+from cmm_uq.jobs.importing.cells.figures import SMALL
 from cmm_uq.jobs.importing.columns import columns_of
-from cmm_uq.jobs.importing.encodings import is_number
 from cmm_uq.jobs.importing.format import (
     Fact,
     FileKeys,
@@ -319,10 +319,12 @@ def _sheets_of(form: Format, content: bytes, where: str, keys: ImportKeys) -> li
 
 def _with_unit(sheet: Sheet) -> Sheet:
     """With the unit that a line ahead of its table says, as ``Units: mm``."""
-    for row in sheet.rows[:LINES_BEFORE] if sheet.unit is None and not sheet.listed else ():
+    rows = sheet.rows[:LINES_BEFORE] if sheet.unit is None and not sheet.listed else ()
+    for row, below in zip_longest(rows, rows[1:], fillvalue=()):  # which may stand below its word
         if sum(cell != "" and is_number(cell) for cell in row) > 1:
             break
-        match = _UNIT_LINE.search(";".join(map(str, row)))
+        text = ";".join(map(str, row))
+        match = _UNIT_LINE.search(f"{text} {below[0]}" if len(row) == len(below) == 1 and text[-1:] == ":" else text)
         if match and (unit := length_named(match[1].strip("[]().,;"))) and unit.name not in SMALL:
             return replace(sheet, unit=unit.name)
     return sheet

@@ -12,7 +12,7 @@ from itertools import islice
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LINE, ROWS
 from cmm_uq.base.messages import Text, Verbatim, number, say
-from cmm_uq.jobs.importing.encodings import head_text, report_lines
+from cmm_uq.jobs.importing.cells.encodings import head_text, report_lines
 from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, NotReadError, Row, Sheet, sheets_of
 
 AXES = ("X", "Y", "Z")
@@ -220,11 +220,15 @@ def _feature(match: re.Match[str], line: int, where: str) -> Row | None:
     return sort.lower(), [match["name"], *numbers[:3], *direction], line
 
 
-_FIELD = re.compile(r"K(\d{4})(?:/(\d+))?\s+(.*)")
+_FIELD = re.compile(r"K(?P<key>\d{4})(?:/(?P<which>\d+))?\s+(?P<text>.*)")
 
 
 class Qdas(TextReport):
-    """Q-DAS transfer files: of each characteristic name (K2002), nominal value (K2101), unit (K2142) and values (K0001)."""
+    """Q-DAS transfer files: of each characteristic name (K2002), nominal value (K2101), unit (K2142) and values.
+
+    A value is a line K0001, or a part of a line without key: characteristics in their order between 0x0F, of each the value,
+    its attribute (0 where it is valid), time and more between 0x14.
+    """
 
     name = "q-das"
     title = say("Q-DAS transfer file (.dfq)")
@@ -235,21 +239,28 @@ class Qdas(TextReport):
         counted = Counter[str]()
         rows: list[Row] = []
         for line, content in enumerate(lines, 1):
-            if not content.strip():
-                continue
             match, at = _FIELD.fullmatch(content.strip()), f"{where} line {line}"
-            if match is None:
-                raise NotReadError("has no key K", where=at, fix="Export values with keys (K0001/1 …)")
-            key, which, text = match.groups()
-            said[key, which or "0"] = text
-            if key == "0002" and text.strip() != "0":
+            values: list[tuple[str, str]] = []
+            attributes = [match["text"]] if match and match["key"] == "0002" else []
+            if match is not None:
+                said[match["key"], match["which"] or "0"] = match["text"]
+                values += [(match["which"] or "", match["text"])] if match["key"] == "0001" else []
+            elif content.strip():
+                parts = [(*part.split("\x14"), "0")[:2] for part in content.strip("\r\n\x0f").split("\x0f")]
+                order = [which for key, which in said if key == "2002"]
+                if len(parts) != len(order) or not all(value.strip() for value, _ in parts):
+                    what = f"has no key K, and not a value for each of {len(order)} characteristics (K2002)"
+                    raise NotReadError(what, where=at, fix="Export values with keys (K0001/1 …)")
+                attributes = [attribute for _, attribute in parts]
+                values = [(which, value) for which, (value, _) in zip(order, parts, strict=True)]
+            if {*map(str.strip, attributes)} - {"0", ""}:
                 raise NotReadError("marks a value as invalid (K0002)", where=at, fix="Take it out")
-            if key == "0001":
+            for which, text in values:
                 name, nominal = (said.get((one, which), "") for one in ("2002", "2101"))
                 if not which or not nominal:
                     raise NotReadError("has no nominal value (K2101)", where=at, fix="Export K2001 ff. too")
                 counted[which] += 1
-                rows.append(("", [name or which, f"{counted[which]}", nominal, text], line))
+                rows.append(("", [name or which, f"{counted[which]}", nominal, text.strip()], line))
         units = {text for (key, _), text in said.items() if key == "2142"}
         if len(units) > 1:
             raise CmmUqError(f"is in {' and '.join(sorted(units))}", where=where, fix="Export it in one unit")

@@ -15,7 +15,8 @@ import numpy as np
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.columns import OPTIONAL
 from cmm_uq.jobs.importing import header
-from cmm_uq.jobs.importing.blocks import DATED, SMALL, Block, CutSheet, heading, unit_of
+from cmm_uq.jobs.importing.blocks import DATED, Block, CutSheet, heading
+from cmm_uq.jobs.importing.cells.figures import SMALL, unit_of
 from cmm_uq.jobs.importing.factors import LINE, RUN, Label, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, WrittenUnit, converted, sort_of, unit_named
 from cmm_uq.jobs.importing.header import plain_words, understood, unspaced, without_unit, words_of
@@ -28,7 +29,7 @@ _OF_NAMES: Mapping[Role, str] = {
 }  # fmt: skip
 _ROLES = {name: role for role, names in _OF_NAMES.items() for name in names.split()}
 _CLAIMS: Mapping[Role, tuple[Role, ...]] = {"reference": ("reference", "nominal", "target")}
-_SEVERAL = re.compile(r"([+-]?\d+[.,]\d+\s+){1,}[+-]?\d+[.,]\d+")
+_SEVERAL = re.compile(r"(?<![^\s])[+-]?\d+[.,]\d+\s+[+-]?\d+[.,]\d+(?!\S)")
 _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
 _FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
 _COARSE = 0.05  # mm: figures printed no finer than this are nominal, and exact
@@ -87,11 +88,8 @@ class FigureColumn:
 
     @property
     def is_length(self) -> bool:
-        """Whether words call it a length; in a language without blanks a word may have another in it."""
-        known, every = words_of("lengths")["length"], [without_unit(text)[0] for text in self.path]
-        words = [word for text in every for word in plain_words(text)]
-        parts = [one for one in known if len(one) > 1]
-        return any(word in known or (unspaced(word) and any(one in word for one in parts)) for word in words)
+        """Whether words call it a length."""
+        return names_length(self.path)
 
     @property
     def deviates(self) -> bool:
@@ -211,6 +209,14 @@ class SheetReading:
             self.covariates.setdefault(name, []).append(float(values[k]))
 
 
+def names_length(path: Sequence[str]) -> bool:
+    """Whether words above a column call it a length; in a language without blanks a word may have another in it."""
+    known, every = words_of("lengths")["length"], [without_unit(text)[0] for text in path]
+    words = [word for text in every for word in plain_words(text)]
+    parts = [one for one in known if len(one) > 1]
+    return any(word in known or (unspaced(word) and any(one in word for one in parts)) for word in words)
+
+
 def said(path: Sequence[str]) -> Role | None:
     """The role that the words above a column say: that of a mean ahead of what it is of, in Asian words the longest."""
     texts = [without_unit(text.replace("\n", " "))[0] for text in path]
@@ -303,10 +309,13 @@ def words_above(key: tuple[str, str]) -> str:
 
 
 def each(grid: CutSheet) -> Iterator[tuple[list[Block], list[int]]]:
-    """Blocks below the same head, with their rows."""
-    by_head: dict[tuple[tuple[str, ...], ...], list[Block]] = {}
+    """Blocks below the same head, with their rows; units in a row of their own hold on below a head that comes again."""
+    by_head: dict[tuple[object, ...], list[Block]] = {}
     for block in grid.blocks:
-        by_head.setdefault(tuple(map(tuple, block.paths)), []).append(block)
+        own = [unit.name if (unit := unit_of(path)) else "" for path in block.paths]
+        heads = [[t for t in path if t and not unit_named(t.strip("[]()<>{} "))] for path in block.paths]
+        keys = [key for key in by_head if key[0] == str(heads)] if not any(own) else []
+        by_head.setdefault(keys[-1] if keys else (str(heads), *own), []).append(block)
     for blocks in by_head.values():
         yield blocks, [row for block in blocks for row in block.rows]
 
@@ -323,13 +332,13 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     taken = rows | {r for one in readings for r in one.others}
     summed = {r for one in readings for r in one.summaries}
     heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
-    cells = (cell for row in taken for cell in grid.sheet.rows[row])
-    if any(isinstance(cell, str) and _SEVERAL.fullmatch(cell.strip()) for cell in cells):
+    cells = (c for row in taken for c in (*grid.sheet.rows[row], *grid.block_of[row].titles[row].values()))
+    if any(isinstance(cell, str) and _SEVERAL.search(cell) for cell in cells):
         return None  # cells that were not cut apart
-    told = []
+    told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
     first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
-    for row in range(first, len(grid.sheet.rows)):
-        if grid.kinds[row] == "text" and row < last and row not in heads:
+    for row in range(len(grid.sheet.rows)):
+        if grid.kinds[row] == "text" and first <= row < last and row not in heads:
             own = [grid.figure(row, k) for k in columns]
             if None not in own and any(f is not None and f[1] < 1 for f in own):
                 return None  # whatever else stands in it, it may be measured
@@ -339,10 +348,13 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
         if row in taken or grid.kinds[row] != "figures":
             continue
         figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in columns)]
-        within = row < last or grid.sheet.lines[row] - grid.sheet.lines[last] == row - last  # without a gap
+        within = (
+            first <= row < last or 0 < grid.sheet.lines[row] - grid.sheet.lines[last] == row - last
+        )  # without a gap
+        within |= readings[0].kind == "points" and columns <= {*figures}
         if figures and within and row not in summed and not _explained(grid, row, figures, rows, columns):
             return None
-        told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures else []
+        told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures and row > first else []
     blank = [cell for one in readings for cell in one.blank]
     if any(map(str.isdigit, "".join(grid.text(row, i) for row, i in blank))):
         return None

@@ -16,7 +16,7 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import compress, islice, pairwise
+from itertools import islice
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError
 
@@ -24,10 +24,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import lines_within
 from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS, UNPACKED
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.jobs.importing.encodings import HOSTILE_FIX, decoded, head_text, local
+from cmm_uq.jobs.importing.cells.encodings import HOSTILE_FIX, decoded, head_text, local
+from cmm_uq.jobs.importing.cells.fixed_columns import in_columns
 from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
-from cmm_uq.jobs.importing.lengths.places import said_in
 from cmm_uq.jobs.importing.reports import in_pairs
 from cmm_uq.jobs.importing.roles import said
 
@@ -35,14 +35,6 @@ _BLANK = " "  # cells of a text without separators, by where they stand
 _TITLES: dict[str, Text] = {
     ",": say("comma"), ";": say("semicolon"), "\t": say("tab"), "|": say("bar"), _BLANK: say("blanks"),
 }  # fmt: skip
-_TOKEN, _PHRASE = re.compile(r"(?:(?![:=|]+(?=\s))\S+)"), re.compile(r"\S+(?: \S+)*")
-_BETWEEN = re.compile(r"(?<=\s)[:|](?=\s)")  # columns
-_POINT = re.compile("[.,]")
-_WIDE = re.compile(
-    "[\u1100-\u115f\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe4f\uff00-\uff60\uffe0-\uffe6]"
-)  # as two
-_HELD = "\0"  # beside a character that is printed as wide as two
-_NUMBER = re.compile(r"[±+-]?\d[\d.,]*%?|[±+-]?[.,]\d+")
 _LINES = re.compile(r"\s*[\r\n]\s*")  # of a heading in a cell
 _KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
@@ -113,71 +105,6 @@ def alternatives(content: bytes, where: str, keys: ImportKeys) -> Iterator[list[
 def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:
     between = Fact("delimiter", say("Between cells"), _TITLES[delimiter])
     return Fact("encoding", say("Encoding"), Verbatim(encoding)), between
-
-
-def in_columns(lines: Sequence[str]) -> Iterator[list[str]]:
-    """Cells of lines by where they stand: columns are where figures stand below each other, heads go to the nearest."""
-    lines = [_WIDE.sub(rf"\g<0>{_HELD}", line.expandtabs()) for line in lines]
-    lines = [_BETWEEN.sub(" ", line) if len(_BETWEEN.findall(line)) > 1 else line for line in lines]
-    tokens = [_row_of(line) for line in lines]
-    spans: list[tuple[int, int]] = []  # where tokens stand, by the most common rows first
-    alike: dict[tuple[bool, ...], list[tuple[int, int]]] = {}  # by where their figures are
-    for own in filter(None, tokens):
-        alike.setdefault(tuple(text[-1].isdigit() for *_, text in own), []).extend(span[:2] for span in own)
-    sizes = {form: len(own) // len(form) for form, own in alike.items()}
-    for form, rows in sorted(sizes.items(), key=lambda one: -one[1]):
-        for start, end in _merged(alike[form]):
-            over = [span for span in spans if start < span[1] and span[0] < end]
-            if len(over) < 2 or 5 * rows > max(sizes.values()):  # else as the name of a summary does
-                spans = [span for span in spans if span not in over]
-                spans.append((min([start, *(a for a, _ in over)]), max([end, *(b for _, b in over)])))
-    spans = _merged(spans)
-    for own, line in zip(tokens, lines, strict=True):
-        phrases = own or [(m.start(), m.end(), m[0]) for m in _PHRASE.finditer(line)]
-        if not own and len(phrases) < 2 and (not phrases or phrases[0][0] < 8):
-            yield [line.strip().replace(_HELD, "")]
-            continue
-        if not own and len(phrases) == len(spans):
-            yield [text.replace(_HELD, "") for _, _, text in phrases]
-            continue
-        cells = [""] * max(1, len(spans))
-        for start, end, text in phrases:
-            nearest = min(range(len(spans)), key=lambda k: abs(spans[k][1] - end), default=0)
-            k = next((k for k, (a, b) in enumerate(spans) if a < end and start < b), nearest)
-            cells[k] = f"{cells[k]} {text.replace(_HELD, '')}".strip()
-        yield cells
-
-
-def _row_of(line: str) -> list[tuple[int, int, str]]:
-    """Where the words of a row of figures stand, or its phrases, of which the last is a figure; none of another line."""
-    for part in (_TOKEN, _PHRASE):
-        own = [(m.start(), m.end(), m[0]) for m in part.finditer(line)]
-        if _is_row([text for *_, text in own], line) and (part is _TOKEN or _NUMBER.fullmatch(own[-1][2])):
-            return own
-    return []
-
-
-def _merged(spans: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Spans in order, those that overlap together."""
-    found: list[tuple[int, int]] = []
-    for start, end in sorted(spans):
-        if found and start < found[-1][1]:
-            found[-1] = (found[-1][0], max(found[-1][1], end))
-        else:
-            found.append((start, end))
-    return found
-
-
-def _is_row(texts: Sequence[str], line: str) -> bool:
-    """Whether a line is a row of figures: no place of a line, and no figures among words (``Mean 35.4339  Range 0.0006``)."""
-    numbers = [_NUMBER.fullmatch(text) is not None for text in texts]
-    n, printed = sum(numbers), any(_POINT.search(text) for text in texts)
-    if 2 * n < len(texts) or not (n > 1 or (len(texts) <= 3 and n and printed)):
-        return False
-    if n > 2 and any(said_in([line], sign).whole for sign in ".,"):
-        return False
-    apart = n > 1 and not any(a and b for a, b in pairwise(numbers))
-    return not apart or (numbers[0] and any(_POINT.search(text) for text in compress(texts, numbers)))
 
 
 def _unquoted(text: str, delimiter: str, where: str, most: int | None) -> Rows:

@@ -20,14 +20,15 @@ from cmm_uq.base.messages import DASH, Verbatim, commas, names, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
-from cmm_uq.jobs.importing.blocks import CutSheet, heading, unit_elsewhere
+from cmm_uq.jobs.importing.blocks import CutSheet, heading
+from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
 from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import places
 from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary
-from cmm_uq.jobs.importing.lengths.evidence import sums_of
+from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lines_and_runs
 from cmm_uq.jobs.importing.lengths.places import place_of_axis, says_figures, stated_places
@@ -39,7 +40,7 @@ from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, row
 
 _COMPARED = 5000  # points of sheets
 ROWS_MOST = 20_000  # of a sheet that is understood this way
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")
 Found = tuple[SheetReading, CutSheet]
 
 
@@ -58,7 +59,7 @@ def understand(
         except NotReadError as error:
             problem, own = problem or error, None
         if own is not None and (points or own.reading.kind != "points"):
-            best = own if best is None or own.confirmed > best.confirmed else best
+            best = own if best is None or own.outdoes(best) else best
             if sheets[0].listed:
                 break
     if best is not None:
@@ -72,7 +73,7 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     """What all sheets hold; ``None`` where nothing is understood. What one sheet asks is asked where no other is read."""
     found: list[Found] = []
     problem: NotReadError | None = None
-    upright = [*map(formats.stacked, sheets)]
+    upright, across = [*map(formats.stacked, sheets)], list[CutSheet]()
     for sheet in upright:
         for read in _ways_of(sheet, keys, where):
             try:
@@ -82,6 +83,7 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
             own = [one for one in own if problem is None or one[0].kind != "points" or not read[1]]
             if own:
                 found += own
+                across += [read[0]] if read[1] else []
                 break
     chosen = _chosen(found)
     if not chosen and problem is not None:
@@ -102,7 +104,10 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
             return None
         left_out += told
     _label(chosen)
-    return Understanding(joined([reading for reading, _ in chosen]), sheets, left_out, chosen[0][1], elsewhere)
+    grid = chosen[0][1]
+    return Understanding(
+        joined([reading for reading, _ in chosen]), sheets, left_out, grid, elsewhere, across=grid in across
+    )
 
 
 def _take_results(found: Sequence[Found], chosen: Sequence[Found]) -> None:
@@ -221,6 +226,10 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
                 reading = read(grid, blocks, own)
             except EitherError as error:
                 problem, reading = problem or error, None
+            if reading is not None and (
+                passes_over_axes(reading, blocks[0].paths) or (across and few_of(reading, grid, own))
+            ):
+                continue
             # of a turned sheet words must say which lengths, or targets, those that were measured are of
             if reading is not None and (
                 reading.called
@@ -265,10 +274,16 @@ class Understanding:
     left_out: list[str]
     grid: CutSheet
     elsewhere: Sequence[tuple[str, str]] = ()  # rows that may say where lines lie, each with the text in its first cell
+    across: bool = False  # whether rows and columns were exchanged
 
-    @property
-    def confirmed(self) -> tuple[int, int]:
-        return self.reading.checked, len(self.reading.figures)
+    def outdoes(self, other: Understanding) -> bool:
+        """Whether it is upright, or arithmetic confirms more, of not far fewer figures."""
+        if self.across != other.across:
+            return other.across
+        (checked, of, size), (others, less, least) = (
+            (one.reading.checked, len(one.reading.figures), np.size(one.reading.figures)) for one in (self, other)
+        )
+        return 2 * size >= least and ((checked, of) > (others, less) or size > 2 * least)
 
     def unit(self, keys: ImportKeys, where: str, reach_mm: float | None) -> tuple[WrittenUnit, Fact]:
         """The unit of lengths: of heads, file or job, the one that the file mentions, or by the size of the machine."""

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.encodings import report_lines
+from cmm_uq.jobs.importing.cells.encodings import report_lines
 from cmm_uq.jobs.importing.reports import statements
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN

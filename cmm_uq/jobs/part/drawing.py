@@ -22,8 +22,8 @@ from pydantic import ValidationError
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.jobs.importing.cells.encodings import local
 from cmm_uq.jobs.importing.documents import child, length_unit, three
-from cmm_uq.jobs.importing.encodings import local
 from cmm_uq.jobs.importing.format import UNITS, length_named
 from cmm_uq.jobs.part.checks import members, unfit
 from cmm_uq.jobs.part.feature import ASKS, CharacteristicFacts, FeatureFacts, What

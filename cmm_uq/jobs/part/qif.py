@@ -15,8 +15,8 @@ from copy import copy
 from xml.etree.ElementTree import Element, SubElement
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.cells.encodings import local, root_of
 from cmm_uq.jobs.importing.documents import child, three
-from cmm_uq.jobs.importing.encodings import local, root_of
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN
 from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, listed, number_of, text, whole_text

@@ -13,7 +13,7 @@ from typing import Any, get_args
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.csv_table import number_problem
-from cmm_uq.jobs.importing.encodings import decimal_sign, values_of
+from cmm_uq.jobs.importing.cells.encodings import decimal_sign, values_of
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Sheet, format_of
 from cmm_uq.jobs.part.drawing import Drawing, Facts, limits, usual_strategy
 from cmm_uq.jobs.part.feature import CharacteristicFacts, FeatureFacts, Kind, Strategy

@@ -19,8 +19,8 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.jobs.importing.cells.encodings import begins_with, local, report_lines, root_of
 from cmm_uq.jobs.importing.documents import child, three
-from cmm_uq.jobs.importing.encodings import begins_with, local, report_lines, root_of
 from cmm_uq.jobs.importing.format import HEAD, length_named
 from cmm_uq.jobs.importing.pcdmis import Dimension, PcDmis, dimensions, figure_of, step_of
 from cmm_uq.jobs.importing.reports import ACTUAL, DMIS_UNIT, Dmis, one_unit, statements

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.blocks import figure
+from cmm_uq.jobs.importing.cells.figures import figure
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import imported
 from tests.jobs.importing.exports import EXPORTS, archive, excel, opendocument

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.encodings import decoded
+from cmm_uq.jobs.importing.cells.encodings import decoded
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, imported
 from tests.jobs.importing.exports import HEADINGS

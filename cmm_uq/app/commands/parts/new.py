@@ -21,7 +21,7 @@ from cmm_uq.app.commands.reading import unwritten
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.files.toml_file import as_toml, nested
-from cmm_uq.jobs.importing.encodings import begins_with, head_text
+from cmm_uq.jobs.importing.cells.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.part.checks import freedoms, members, unfit
 from cmm_uq.jobs.part.dmis import STATEMENT, drawing_of_dmis

@@ -12,9 +12,11 @@ from itertools import permutations
 
 import numpy as np
 
+from cmm_uq.jobs.importing.blocks import CutSheet
 from cmm_uq.jobs.importing.factors import numberless, way_of
-from cmm_uq.jobs.importing.roles import FigureColumn
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading
 
+_PART = 4  # of the figures of a turned sheet, the least that is read
 _LEAST = 4  # rows by which a column is known to follow from another
 
 
@@ -64,7 +66,7 @@ def follows(column: FigureColumn, base: FigureColumn) -> bool:
     if 4 * len(of) <= 3 * len(own):
         first = np.full(len(of), np.nan)
         first[which] = own
-        return bool(np.abs(own - first[which]).max() <= 1e-9)
+        return bool(np.abs(own - first[which]).max(initial=0.0) <= 1e-9)
     if len(own) < _LEAST or own.min() < 0 or len(of) < 3:
         return False
     line = np.polyval(np.polyfit(base.values[both], own, 1), base.values[both])
@@ -103,3 +105,18 @@ def sets_of(columns: Sequence[FigureColumn], beside: FigureColumn) -> Iterator[S
     yield from ([c for c in columns if way_of(c.heading) == sense] for sense in (1, -1))
     yield from families(columns)
     yield [c for c in columns if c.i < beside.i]
+
+
+def few_of(reading: SheetReading, grid: CutSheet, rows: Sequence[int]) -> bool:
+    """Whether a reading of what stands across has so few of its figures that arithmetic may fit by chance."""
+    return _PART * np.size(reading.figures) < sum(f is not None for row in rows for f in grid.figures[row])
+
+
+def passes_over_axes(reading: SheetReading, paths: Sequence[Sequence[str]]) -> bool:
+    """Whether lengths that stand less nothing leave out columns below X, Y and Z, which are places."""
+    if reading.kind != "lengths" or reading.taken.get("reference_mm"):
+        return False
+    used = {c.i for c in reading.source}
+    named = [(i, {*" ".join(path).upper().split()} & {*"XYZ"}) for i, path in enumerate(paths)]
+    every = {axis for _, own in named for axis in own}
+    return len(every) == len("XYZ") and any(own for i, own in named if i not in used)

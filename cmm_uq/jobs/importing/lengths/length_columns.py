@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading, unit_of
+from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
+from cmm_uq.jobs.importing.cells.figures import unit_of
 from cmm_uq.jobs.importing.factors import hint, numberless
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, WrittenUnit
 from cmm_uq.jobs.importing.lengths.evidence import (

@@ -1,0 +1,181 @@
+"""Arrangements of points as reports have them: pages, results below, rows of axes, rings, packed lines, fixed columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.recording import ImportedTable, imported
+
+TRIANGLE = np.array([[0.0, 0.0, 0.0], [240.0, 0.0, 0.0], [120.0, 207.8461, 0.0]])
+PLACED = [(TRIANGLE + start).tolist() for start in ((-520, -410, -420), (-150, -410, -420), (-520, -160, -250))]
+
+
+def read(lines: Sequence[str], **keys: object) -> ImportedTable:
+    return imported("\n".join([*lines, ""]).encode(), "a.csv", ImportKeys.model_validate(keys))
+
+
+def problem(lines: Sequence[str], **keys: object) -> str:
+    with pytest.raises(CmmUqError) as refused:
+        read(lines, **keys)
+    return f"{refused.value} {refused.value.fix}"
+
+
+def groups(found: ImportedTable) -> list[int]:
+    return found.columns["measurement"].astype(int).tolist()
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(1, 23), st.booleans())
+def test_a_page_may_break_anywhere(at: int, numbered: bool) -> None:
+    """The head comes again without its row of units, under the number of the page."""
+    rows = [
+        f"P{m};K{b};{100 * m + 37.5 * b + 0.0012:.4f};{50 * m:.4f};-{20 * m:.4f}" for m in (1, 2, 3) for b in range(8)
+    ]
+    pages = [*rows[:at], *(["Brogu 2 / Page 2"] if numbered else []), "Pos;Ball;X;Y;Z", *rows[at:]]
+    found = read(["Pos;Ball;X;Y;Z", ";;[mm];[mm];[mm]", *pages])
+    assert found.lines.size == 24
+    assert groups(found) == [m for m in (1, 2, 3) for _ in range(8)]
+
+
+def test_numbers_of_pages_are_of_no_measurement() -> None:
+    lines = ["UNITS: mm"]
+    for position, page in ((1, 1), (2, 3)):
+        lines += [f"Quim 7   Page {page}", f"POSITION {position}   turned about Z   {90 * position} deg   FRAME: A"]
+        lines += [" Element      X            Y            Z", " ------------------------------------------"]
+        for k in range(6):
+            if k == 3:
+                lines += [f"Quim 7   Page {page + 1}", " Element      X            Y            Z"]
+            x, y = (83.0 * (k % 3), 83.0 * (k // 3))
+            lines.append(f" E{position}({k + 1}) {200 + x + position:12.4f} {300 + y:12.4f} {-10.0 * position:12.4f}")
+    assert groups(read(lines)) == [1] * 6 + [2] * 6
+
+
+def test_what_goes_on_on_the_next_page_is_the_same_measurement() -> None:
+    lines = ["UNITS: mm"]
+    for page in (1, 2):
+        lines += [f"Quim 7   Page {page}", " Element      X            Y            Z"]
+        own = range(3 * page - 3, 3 * page)
+        lines += [f" E({k})    {200 + 83 * (k % 3):12.4f} {300 + 83 * (k // 3):12.4f} {-10.0:12.4f}" for k in own]
+    assert groups(read(lines)) == [1] * 6
+
+
+def test_results_below_points_are_told_and_points_are_not_results() -> None:
+    points = [f"R{k}\tKRE\t{3000 + k / 7:.4f}\t{k * 90.5:.4f}\t{k * k * 11.3:.4f}" for k in range(8)]
+    head = ["Unit: mm", "", "Name\tType\tX\tY\tZ"]
+    assert len(read([*head, *points, "ITS\tKRE\t12.1000\t900.2000\t44.1000"]).lines) == 9
+    found = read([*head, *points, "Zentrum\tMP\t3000.5000\t300.2000\t200.1000"])
+    told = next(str.__str__(fact.value) for fact in found.recognised.facts if fact.key == "left_out")
+    assert len(found.lines) == 8
+    assert "Zentrum" in told
+
+
+def test_what_two_columns_differ_by_is_no_place() -> None:
+    """Deviations in mm below words that nobody knows."""
+    lines = ["Kilba;Orbit;Fosta [mm];Trumi [mm];Zapoli [mm]"]
+    random = np.random.default_rng(3)
+    for k, place in enumerate(np.array(PLACED).reshape(-1, 3)):
+        for axis, nominal in zip("XYZ", place, strict=True):
+            measured = round(nominal + random.normal(0, 0.003), 4)
+            lines.append(f"B{k + 1};{axis};{nominal:.4f};{measured:.4f};{measured - nominal:.4f}")
+    assert "may both be measured" not in problem(lines)
+
+
+def packed(*, attribute: str = "0", value: str = "100.00091") -> bytes:
+    lines = ["K0100 6", "K1001 KP300"]
+    for n, (name, nominal) in enumerate(
+        ((f"Kugel{b}.{a}", v) for b, v in ((1, "0.0"), (2, "100.0")) for a in "XYZ"), 1
+    ):
+        lines += [f"K2001/{n} {n}", f"K2002/{n} {name}", f"K2101/{n} {nominal}", f"K2142/{n} mm"]
+    for run in range(2):
+        figures = (f"0.0005{run}", "0.00135", "-0.00078", value, f"0.0002{run}", "0.00002")
+        lines.append("\x0f".join(f"{one}\x14{attribute}\x1405.03.2024/07:1{run}:00\x14\x14KMG\x14" for one in figures))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def test_packed_lines_of_q_das() -> None:
+    found = imported(packed(), "a.dfq", ImportKeys())
+    assert found.columns["point"].tolist() == [1, 2, 1, 2]
+    assert found.columns["repeat"].tolist() == [1, 1, 2, 2]
+    assert found.columns["x_mm"].tolist() == [0.0005, 100.00091, 0.00051, 100.00091]
+
+
+@pytest.mark.parametrize("spoiled", [{"attribute": "255"}, {"value": " "}])
+def test_packed_lines_with_a_value_that_is_none(spoiled: dict[str, str]) -> None:
+    with pytest.raises(CmmUqError, match=r"K0002|not a value for each of 6"):
+        imported(packed(**spoiled), "a.dfq", ImportKeys())
+
+
+@pytest.mark.parametrize("length", ["Längd 1 (mm)", "Length 1"])
+def test_whole_places_beside_lengths_were_not_measured(length: str) -> None:
+    rows = [f"{k},{150 + 10 * k},{300 + k},200,{850 + 10 * k},{300 + k},200,700.01{k}8,700.01{k}3" for k in range(1, 8)]
+    head = f"Pos,Ball A X,Ball A Y,Ball A Z,Ball B X,Ball B Y,Ball B Z,{length},{length.replace('1', '2')}"
+    try:
+        found = set(read([head, *rows], unit="mm").columns)
+    except CmmUqError as error:  # refused, or asked where the lines lie
+        found = {"reference_mm"} if "points_per" not in str(error.fix) else set()
+    assert "reference_mm" in found
+
+
+def ring(turn: float = 0.0, count: int = 9) -> list[str]:
+    angles = 2 * np.pi * np.arange(count) / count + turn
+    return [f"{300 + 150 * np.cos(a):.4f};{200 + 150 * np.sin(a):.4f};{-100 + 40 * turn:.4f}" for a in angles]
+
+
+def test_a_ring_is_one_measurement() -> None:
+    named = [f"B{k + 1};{row}" for k, row in enumerate(ring())]
+    assert groups(read(["Name;X;Y;Z", *named], unit="mm")) == [1] * 9
+
+
+def test_a_beam_measured_twice_in_turn() -> None:
+    ways = ((1, 0), (0.6, 0.8))
+    rows = [f"{100 + k * 100 * c:.4f};{200 + k * 100 * s:.4f};{-100 - 20 * s:.4f}" for c, s in ways for k in range(5)]
+    assert groups(read(["X;Y;Z", *rows], unit="mm")) == [1] * 5 + [2] * 5
+
+
+def test_names_of_points_that_may_be_one_artefact_in_several_places_are_asked_about() -> None:
+    rows = [f"S{k + 1};{x:.4f};{y:.4f};{z:.4f}" for k, (x, y, z) in enumerate(np.array(PLACED).reshape(-1, 3).tolist())]
+    assert "points_per_measurement" in problem(["Name;X;Y;Z", *rows], unit="mm")
+    assert groups(read(["Name;X;Y;Z", *rows], unit="mm", points_per_measurement=3)) == [1] * 3 + [2] * 3 + [3] * 3
+
+
+def test_four_places_that_may_be_two_bars_are_asked_about() -> None:
+    rows = ["376.7774;503.8057;-211.6478", "363.7980;315.8941;-278.9090"]
+    rows += ["470.8086;236.8827;-518.1434", "457.8292;48.9711;-585.4046"]
+    assert "points_per_measurement" in problem(["X;Y;Z", *rows], unit="mm")
+
+
+def test_heads_are_counted_where_names_of_two_words_stand_below_them() -> None:
+    """Columns that no figures align with their heads, as long as rows and head have as many phrases."""
+    lines = ["Unit: mm", "Pos     Ball     x nom     x act      y nom     y act      z nom     z act"]
+    for k, place in enumerate(np.array(PLACED[:2]).reshape(-1, 3)):
+        cells = "   ".join(f"{v:.1f}   {v + 0.0013 * (k + 1):.4f}" for v in place)
+        lines.append(f"Pos {k // 3 + 1}   Ball {k % 3 + 1}   {cells}")
+    found = read(lines)
+    assert groups(found) == [1] * 3 + [2] * 3
+    assert found.columns["x_mm"][0] == pytest.approx(PLACED[0][0][0] + 0.0013)
+
+
+def test_a_head_between_commas_above_columns_between_blanks() -> None:
+    """As survey forms have it; the unit stands below its word."""
+    lines = ["> Units:", "m", "> Column Names:", "Point Name,XLOCAL,YLOCAL,ZLOCAL,Type,Precision(mm)", "> Data:"]
+    lines += [
+        f"R0{k} {3.0161 + 1e-4 * (k % 3):.4f} {0.7 * k - 2:.4f} {(k * k) % 7 - 2.1:.4f} M 0.2" for k in range(1, 9)
+    ]
+    found = read(lines)
+    assert found.columns["x_mm"][:2].tolist() == [3016.2, 3016.3]
+    assert found.lines.size == 8
+
+
+def test_figures_that_begin_with_nought_are_no_thousands() -> None:
+    turned = [PLACED[0], [(x, z, -y) for x, y, z in PLACED[1]]]
+    rows = [f"T_P{m}_S{k};Centre {a};{v:.3f}".replace(".", ",") for m, t in enumerate(turned, 1) for k, own in enumerate(t, 1)
+            for a, v in zip("XYZ", (own[0] + 520, own[1], own[2]), strict=True)]  # fmt: skip
+    found = read(["Nom;Contrôle;Mesuré [mm]", *rows])
+    assert found.columns["x_mm"][0] == 0.0
+    assert groups(found) == [1] * 3 + [2] * 3
