@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -191,8 +192,12 @@ class JobFile(JobTable):
     def certified_on_this_machine(self) -> bool:
         """Whether the artefact's certificate comes from the machine that the artefact now tests."""
         chain, machine = self.artefact.certificate, self.machine
-        own = {name.strip().casefold() for name in (machine.name, machine.serial) if name.strip()}
-        return chain is not None and chain.machine.strip().casefold() in own
+        stated, serial = "" if chain is None else chain.machine, machine.serial
+        if not _words(stated):
+            return False
+        telling = len(_words(serial)) > 2 and any(letter.isdigit() for letter in serial)  # 1102, and not 7
+        within = telling and f" {_words(serial)} " in f" {_words(stated)} "
+        return within or _words(stated) in (_words(machine.name), _words(serial))
 
     @model_validator(mode="before")
     @classmethod
@@ -201,6 +206,11 @@ class JobFile(JobTable):
         if isinstance(data, dict) and not getattr(table, "with_recording", True):
             return {"recording": {"file": ""}, **data}
         return data
+
+
+def _words(name: str) -> str:
+    """Letters and digits of a name, its words a space apart, however it is written."""
+    return " ".join(re.findall(r"[^\W_]+", name.casefold()))
 
 
 def _sensing(probe: ProbeFacts, machine: MachineFacts) -> str | None:

@@ -52,6 +52,23 @@ def without(chain: dict[str, Any], *keys: str, **other: Any) -> dict[str, Any]:
     return {key: value for key, value in chain.items() if key not in keys} | other
 
 
+@pytest.mark.parametrize(("certified_on", "serial", "own"), [
+    ("", "1102", False), ("", "", False), ("Bridge machine", "", True), ("bridge  MACHINE", "", True),
+    ("Bridge-machine", "", True),
+    ("1102", "1102", True), ("DEA Iota, no. 1102", "1102", True), ("DEA Iota 1102", "IOTA 1102", True),
+    ("PTB's large bridge machine", "1102", False), ("DEA Iota 11022", "1102", False), ("PMM 12", "12", False),
+    ("PMM 12", "PMM", False),
+])  # fmt: skip
+def test_the_machine_is_recognised_however_the_artefacts_certificate_writes_it(
+    certified_on: str,
+    serial: str,
+    own: bool,
+) -> None:
+    """As its name or serial number, or with that number among its words, where it is a telling one."""
+    found = job_with(NATIONAL | {"machine": certified_on}, machine={"name": "Bridge machine", "serial": serial})
+    assert found.facts.certified_on_this_machine == own
+
+
 @pytest.mark.parametrize(("chain", "claim", "sentence"), [
     (NATIONAL, "traceable", TRACEABLE +
      "Artefact: certificate 1234-PTB-25 of 2025-06-01, issued by PTB, a national metrology "

@@ -86,6 +86,7 @@ class CertificateStatus:
     # of one where they do not say, and as a whole without records
     changes: Mapping[str, float | None] | None = None
     further: tuple[FurtherCertificate, ...] = ()
+    circular: bool = False  # whether an artefact of the calibration was certified on this very machine
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from cmm_uq.certificate.origin import NAME, further_table
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, figures_of
 from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.wording import titles
+from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 
@@ -168,11 +169,17 @@ def _unstated(found: PartMeasurement) -> list[Text]:
 
 
 def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
-    """That nothing is called conforming by an uncertainty that lacks some cause."""
-    if found.measured is None or not any(found.judged) or not (without := _unstated(found)):
+    """Why nothing is called conforming: an uncertainty that lacks some cause, a machine that nobody measured, or by itself."""
+    if found.measured is None or not any(found.judged):
         return ()
-    what = messages.listed(without)
-    return (say("Nothing is called conforming, for the job states no uncertainty of these: {what}.", what=what),)
+    what, standing, of_part = messages.listed(_unstated(found)), found.standing, found.job.facts.job.origin
+    return tuple(holding(
+        (what, say("Nothing is called conforming, for the job states no uncertainty of these: {what}.", what=what)),
+        (of_part == MEASURED != standing.origin,
+         say("Nothing is called conforming, for nobody measured the machine: its calibration is no measurement.")),
+        (standing.circular, say("Nothing is called conforming, for the artefact that calibrated the machine was itself "
+                                "certified on that machine.")),
+    ))  # fmt: skip
 
 
 _NOTHING = 5e-4  # share of a variance that is printed as none

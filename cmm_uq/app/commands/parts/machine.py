@@ -34,7 +34,7 @@ from cmm_uq.certificate.clauses import draft
 from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
 from cmm_uq.certificate.sections.regions import readings_warnings
 from cmm_uq.certificate.verify.given import CHECKS, Given, given_of
-from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.job import CIRCULAR, Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED
@@ -167,8 +167,15 @@ def state_machine(
     known = None if since.history is None else known_of(since.history)
     refuse_adjusted(more, known.adjusted if known else (), standing.date)
     state, path, given, further = given_recordings(state, stated.job, more, known.change if known else None, seed)
+    circular = standing.circular or any(one.job.facts.certified_on_this_machine for one in more)
     standing = replace(
-        standing, path=path, drift=since.told, given_recording=given, changes=since.changes, further=further.each
+        standing,
+        circular=circular,
+        path=path,
+        drift=since.told,
+        given_recording=given,
+        changes=since.changes,
+        further=further.each,
     )
     told = [*further.warnings, *machine_warnings(job, standing, stated.job)]
     told += readings_warnings(state.statements, state.scales)
@@ -325,6 +332,9 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> CertificateSta
         given_recording=False, path=NOTHING, drift=NOTHING,
         temperature_c=None if recorded is None else float(np.mean(recorded)),
         inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
+        circular=own.certified_on_this_machine if own is not None else any(
+            one["key"] == CIRCULAR[1] and one["status"] == "missing" for one in stated.results.get("iso17025") or ()
+        ),
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
 from cmm_uq.app.commands.certificates.further import given_recordings
-from cmm_uq.app.commands.parts.machine import state_machine
+from cmm_uq.app.commands.parts.machine import standing_of, state_machine, verified
 from cmm_uq.app.commands.parts.part import PartOptions, affordable, decide_limits, evaluate_part
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
@@ -28,8 +28,8 @@ from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.part.method import decided_without
 from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_verdicts
-from cmm_uq.certificate.verify.given import Inquiry
-from cmm_uq.jobs.part.job import TABLES
+from cmm_uq.certificate.verify.given import Inquiry, given_of
+from cmm_uq.jobs.part.job import TABLES, read_part
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
 from tests.jobs.part.parts import NOBODY, plate, tables
@@ -373,6 +373,14 @@ def test_a_decision_says_of_what_no_uncertainty_is_stated(table: str, changes: d
     assert not decided_without(replace(there, measured=None))
 
 
+def stating(**changes: Any) -> PartMeasurement:
+    """The plate, had its job stated these tables."""
+    found = shifted()
+    return replace(
+        found, job=replace(found.job, facts=plate(job=tables()["job"] | {"origin": "simulated"}, **changes).facts)
+    )
+
+
 @pytest.mark.parametrize(("changes", "lacks"), [
     ({}, ""),
     ({"placing": {"u_fixture_um": 0.1}, "probing": {"u_operator_um": 0.1}, "negligible": None},
@@ -383,8 +391,7 @@ def test_a_decision_says_of_what_no_uncertainty_is_stated(table: str, changes: d
     ({"negligible": None}, "clamping, operators and uneven and drifting temperatures"),
 ])  # fmt: skip
 def test_what_may_be_declared_negligible_is_stated_or_declared(changes: dict[str, Any], lacks: str) -> None:
-    found = shifted()
-    there = replace(found, job=replace(found.job, facts=plate(**changes).facts))
+    there = stating(**changes)
     assert [str(text).rpartition(": ")[2] for text in decided_without(there)] == ([f"{lacks}."] if lacks else [])
 
 
@@ -395,9 +402,36 @@ def test_tips_whose_places_to_each_other_nobody_states_pass_nothing(offsets: lis
     (down,), features = tables()["stylus"], tables()["feature"]
     styli = [down | {"name": name, "u_offset_um": u} for name, u in zip(("down", "side"), offsets, strict=True)]
     probed = [one | {"stylus": "side" if one["name"] == "bore" else "down"} for one in features]
+    assert bool(decided_without(stating(stylus=styli, feature=probed))) == lacks
+
+
+@pytest.mark.parametrize(("standing", "lack"), [
+    ({}, ""), ({"origin": "measured"}, ""), ({"origin": "measured", "circular": True}, "certified on that machine."),
+    ({"origin": "simulated"}, "its calibration is no measurement."),
+    ({"origin": "compensated"}, "its calibration is no measurement."),
+])  # fmt: skip
+def test_a_measured_part_conforms_by_a_machine_that_somebody_measured_independently(
+    standing: dict[str, Any], lack: str
+) -> None:
+    """A part measured on a machine that is simulated passed, with a warning beside it."""
     found = shifted()
-    there = replace(found, job=replace(found.job, facts=plate(stylus=styli, feature=probed).facts))
-    assert bool(decided_without(there)) == lacks
+    if standing:
+        facts = found.job.facts.model_copy(
+            update={"job": found.job.facts.job.model_copy(update={"origin": "measured"})}
+        )
+        found = replace(found, job=replace(found.job, facts=facts), standing=replace(found.standing, **standing))
+    assert [str(text).endswith(lack) for text in decided_without(found)] == ([True] if lack else [])
+
+
+def test_the_iotas_certificate_says_that_its_artefact_was_certified_on_it() -> None:
+    """By the inputs inside the PDF, and by what results.json alone says is missing."""
+    folder = ROOT / "examples" / "part-iota"
+    whole = read_part(folder)
+    assert standing_of(whole, verified(whole)).circular
+    inside = given_of(whole.machine_files).files
+    figures = plate_of({f"machine/{name}": inside[name] for name in ("results.json", "posterior.npz")}, **THERE)
+    assert standing_of(figures, verified(figures)).circular
+    assert not standing_of(plate_of(by_certificate()), verified(plate_of(by_certificate()))).circular
 
 
 def test_what_is_stated_and_declared_is_refused() -> None:
