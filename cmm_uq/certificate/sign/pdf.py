@@ -152,7 +152,9 @@ def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> t
         embedded = reader.embedded_signatures
         evidence = _evidence(reader)
     except Exception as error:  # whatever a hostile file makes the library raise
-        raise CmmUqError(f"cannot be read as a PDF: {error}", where=where, fix="Name a PDF that is whole") from None
+        raise CmmUqError(
+            f"cannot be read as a PDF: {str(error).rstrip('.')}", where=where, fix="Name a PDF that is whole"
+        ) from None
     file = _File(data, reader, tuple(embedded), evidence, trust)
     found = []
     for signature in embedded:
@@ -273,6 +275,8 @@ def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text
         alone &= all(_fits(file.data, one) and library.is_good_stamp(one, file.evidence, file.trust) for one in stamps)
         return (True, []) if alone else (False, [STAMP_ELSE])
     count = file.reader.total_revisions - 1 - embedded.signed_revision
+    if not count:  # what does not fit is the signed revision itself
+        return False, []
     changed = commas([Verbatim(name) for name in _changed(file.reader, embedded.signed_revision)])
     return False, [
         plural(count, one=say("{count} revision was appended after it, and changes {what}", count=count, what=changed),

@@ -16,8 +16,9 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from cmm_uq.certificate.verify.figures import quantities
-from cmm_uq.certificate.verify.given import AGAIN, RESULTS, Given, Inquiry, canonical, strict_json
+from cmm_uq.certificate.verify.given import AGAIN, RESULTS, Given, Inquiry
 from cmm_uq.certificate.verify.opened import read_html
+from cmm_uq.certificate.verify.texts import canonical, strict_json
 from cmm_uq.certificate.verify.views import Difference, differing_parts, first_difference
 from cmm_uq.maths.uncertainty.quantity import rounded
 

@@ -3,78 +3,27 @@
 from __future__ import annotations
 
 import json
-import math
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from hashlib import sha256
-from itertools import accumulate
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.limits import GIVEN, JSON_BYTES, JSON_DEPTH, NUMERAL, PDF_BYTES, content_of, text_of
+from cmm_uq.base.files.limits import GIVEN, PDF_BYTES, content_of
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import MANIFEST
 from cmm_uq.base.output.manifest import Manifest, parsed, plain_name
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.verify.opened import HtmlPage, PdfFile, read_html, read_pdf
+from cmm_uq.certificate.verify.texts import plain, strict_json, with_ends
 
 RESULTS, JOB = "results.json", "job.toml"
 RESULTS_SCHEMA, PART_SCHEMA = "cmm-uq/results/1", "cmm-uq/part/1"
-_FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
 _FIX_OF_GIVEN = "Give files that cmm-uq report, diagnose or part wrote, or their folder"
-
-
-def strict_json(content: bytes, where: str) -> dict[str, Any]:
-    """The object of a JSON file: each key once, numbers that are numbers, nested within limits."""
-    refusal = partial(CmmUqError, where=where, fix=_FIX)
-    if len(content) > JSON_BYTES.most:
-        raise refusal(f"is larger than {JSON_BYTES.most} bytes")
-    text = text_of(content, where, _FIX)
-    if _depth(text) > JSON_DEPTH.most:
-        raise refusal(f"is nested deeper than {JSON_DEPTH.most} levels")
-
-    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        values = dict(pairs)
-        if len(values) < len(pairs):
-            names = [key for key, _ in pairs]
-            raise refusal(f"has the key {next(key for i, key in enumerate(names) if key in names[:i])!r} twice")
-        return values
-
-    def numeral(of: type[int | float], text: str) -> Any:
-        number = None if len(text) > NUMERAL.most else of(text)
-        if number is None or not math.isfinite(number):
-            raise refusal(f"has a number that is none: {text}")
-        return number
-
-    real = partial(numeral, float)
-    try:
-        data = json.loads(
-            text, object_pairs_hook=once, parse_int=partial(numeral, int), parse_float=real, parse_constant=real
-        )
-    except json.JSONDecodeError as error:
-        raise CmmUqError(f"is no JSON: {error.msg}", where=f"{where} line {error.lineno}", fix=_FIX) from None
-    if not isinstance(data, dict):
-        raise refusal("holds no JSON object")
-    return data
-
-
-def canonical(data: Any) -> bytes:
-    """The bytes that this program writes of plain data whose numbers are rounded."""
-    return (json.dumps(data, indent=2, ensure_ascii=False) + "\n").encode()
-
-
-_QUOTED = re.compile(r'"(?:[^"\\]|\\.)*+"?', re.DOTALL)
-
-
-def _depth(text: str) -> int:
-    """Of brackets outside strings, before anything recurses."""
-    steps = (1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[{\]}]", _QUOTED.sub("", text)))
-    return max(accumulate(steps), default=0)
 
 
 @dataclass
@@ -82,7 +31,8 @@ class Given:
     """The forms of one certificate, each with its name, and ``None`` where it is not given.
 
     ``results`` may be the one inside the PDF; ``digital_inside`` whether the XML is; ``page_inside`` the page that the XML
-    carries; ``others`` further files by name: inputs, draws of the posterior; ``manifest`` of a folder.
+    carries; ``others`` further files by name: inputs, draws of the posterior; ``manifest`` of a folder; ``rewritten`` names of
+    those that came with other line ends than they were issued with.
     """
 
     pdf: tuple[str, PdfFile] | None = None
@@ -94,6 +44,7 @@ class Given:
     others: dict[str, bytes] = field(default_factory=dict)
     manifest: Manifest | None = None
     contents: dict[str, bytes] = field(default_factory=dict)
+    rewritten: list[str] = field(default_factory=list)
 
     @property
     def of_part(self) -> bool:
@@ -110,10 +61,11 @@ def read_given(paths: Iterable[Path]) -> Given:
     """Files, and those of folders, read within limits."""
     read: dict[str, tuple[bytes, str]] = {}
     for name, path in _files(paths):
-        if name in read:
+        content = content_of(path, PDF_BYTES, _FIX_OF_GIVEN)
+        if name in read and read[name][0] != content:
             problem = f"there are two files {name!r}, and one certificate is verified at a time"
             raise CmmUqError(problem, where=str(path), fix=_FIX_OF_GIVEN)
-        read[name] = content_of(path, PDF_BYTES, _FIX_OF_GIVEN), str(path)
+        read[name] = content, str(path)
     return _given(read)
 
 
@@ -126,31 +78,47 @@ def _given(read: Mapping[str, tuple[bytes, str]]) -> Given:
     """Contents of files by name, each with how messages name it."""
     given = Given()
     for name, (content, where) in read.items():
-        given.contents[name] = content
-        _sort(given, name, content, where)
+        own = name.lower().endswith((".json", ".html", ".htm", ".xml"))
+        given.contents[name] = plain(content) if own else content  # as cmm-uq writes them
+        _sort(given, name, given.contents[name], where)
     if given.results is None and given.pdf is not None and RESULTS in given.pdf[1].files:
         content = given.pdf[1].files[RESULTS]
         where = f"{RESULTS} in {given.pdf[0]}"
         given.results = where, strict_json(content, where), content
     if given.results is None and not (given.pdf or given.html or given.xml):
         names = ", ".join(where for _, where in read.values())
-        raise CmmUqError("nothing given is a certificate", where=names, fix=_FIX_OF_GIVEN)
+        packed = any(content.startswith(b"PK\3\4") for content, _ in read.values())
+        fix = "Unpack what is in it, and give the folder" if packed else _FIX_OF_GIVEN
+        raise CmmUqError("nothing given is a certificate", where=names, fix=fix)
+    job = None if given.results is None else given.results[1].get("job")
+    wanted = job.get("inputs_sha256") if isinstance(job, dict) else None
+    for name, digest in wanted.items() if isinstance(wanted, dict) else ():
+        if name in given.others:
+            given.contents[name] = given.others[name] = with_ends(given.others[name], digest)
+    given.rewritten += [name for name, (content, _) in read.items() if given.contents[name] != content]
     return given
 
 
+_OF_WINDOWS = frozenset({"thumbs.db", "ehthumbs.db", "desktop.ini"})
+
+
 def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
-    """Those of a folder in order, also of folders inside it those that its manifest names; links lead elsewhere: refused."""
+    """Those of a folder in order, also of folders inside it those that its manifest names; links lead elsewhere: refused.
+
+    What Windows puts into a folder that is looked at is passed over, as names that begin with a dot are.
+    """
     files: list[tuple[str, Path]] = []
     link = "is a link, which may lead to anything"
     for path in paths:
-        if path.is_symlink():
-            raise CmmUqError(link, where=str(path), fix="Give the file itself")
-        if not path.is_dir():
+        if os.path.islink(path):  # noqa: PTH114 - raises nothing of a name that is too long
+            raise CmmUqError(link, where=str(path), fix=f"Give what it leads to: {os.path.realpath(path)}")
+        if not os.path.isdir(path):  # noqa: PTH112 - the same
             files.append((path.name, path))
             continue
         inside = sorted(
             entry.name for entry in os.scandir(path)
-            if not entry.name.startswith(".") and not entry.is_dir(follow_symlinks=False)
+            if not entry.name.startswith(".") and entry.name.lower() not in _OF_WINDOWS
+            and not entry.is_dir(follow_symlinks=False)
         )  # fmt: skip
         if not inside:
             raise CmmUqError("holds no files", where=str(path), fix=_FIX_OF_GIVEN)
@@ -270,6 +238,14 @@ def _check_provenance(inquiry: Inquiry, given: Given) -> None:
     if (content := given.files.get(PROVENANCE)) is None:
         return
     entities, there = strict_json(content, PROVENANCE).get("entity", {}), {**given.contents, **given.files}
+    inside = {} if given.pdf is None else given.pdf[1].files
+    if (
+        given.pdf
+        and PROVENANCE in inside
+        and RESULTS not in inside
+        and any(one.get("prov:label") == RESULTS for one in entities.values())
+    ):
+        inquiry.wrong("files", given.pdf[0], f"attachment {RESULTS}", f"is missing, and {PROVENANCE} names it")
     for one in entities.values():
         name, digest = one.get("prov:label"), one.get("cmm-uq:sha256")
         if digest is not None and name in there and not name.endswith(".xml"):  # which may be signed since then

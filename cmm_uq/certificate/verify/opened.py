@@ -85,6 +85,9 @@ def _revisions(content: bytes, marks: list[re.Match[bytes]], where: str) -> list
     while True:
         trailer = _TRAILER.search(content, at) if content.startswith(b"xref", at) else None
         own = None if trailer is None else of.get(trailer.start("end"))
+        if b"/Linearized" in content[:1024] or re.match(rb"\d+\s+\d+\s+obj\b", content[at : at + 40]):
+            problem = "was saved anew by another program, its table of objects packed or divided"
+            raise CmmUqError(problem, where=where, fix=_FIX)
         if trailer is None or own is None or int(own[1]) != at:
             raise CmmUqError("has no table of its objects where it says: it is damaged, or no PDF of cmm-uq",
                              where=f"{where}: byte {place}", fix=_FIX)  # fmt: skip

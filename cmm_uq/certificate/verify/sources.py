@@ -18,7 +18,8 @@ from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import PDF_BYTES, content_of
 from cmm_uq.certificate.sign.found import AFTER
-from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, Inquiry, given_of, strict_json
+from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, Inquiry, given_of
+from cmm_uq.certificate.verify.texts import strict_json
 from cmm_uq.certificate.verify.views import AHEAD, Signed
 from cmm_uq.jobs.chain import dates_out_of_order
 from cmm_uq.jobs.dcc import read
@@ -95,9 +96,14 @@ def check_records(inquiry: Inquiry, given: Given, records: Records, signed: Sequ
     if found or broken:
         return
     recorded, number = records.files_of(stated.results_sha256), stated.head.entries
-    own = f"The certificate is entry {recorded[stated.results_sha256].number} of the records. They "
+    own = recorded[stated.results_sha256].number
     told = f"have entry {number}, which it states: nothing up to there was rewritten since."
-    inquiry.notes.append(own + (told if number else "were empty when it was made."))
+    if number or own == 1:
+        empty = "were empty when it was made."
+        inquiry.notes.append(f"The certificate is entry {own} of the records. They {told if number else empty}")
+    else:
+        why = f"it says that they were empty, and is their entry {own}: it may have been imported from others"
+        inquiry.left("whether it was made with these records", why)
     for name, content, signature in signed:
         if signature.intact:
             digests = (sha256(each).hexdigest() for each in (signature.content, content))
@@ -154,8 +160,8 @@ def inputs_of(inquiry: Inquiry, given: Given) -> dict[str, bytes] | None:
     sound = sum(is_sound(file, digest, name, missing) for file, digest in wanted.items()) == len(wanted)
     if given.pdf is None and not sound and not (wanted.keys() & files.keys()):
         inquiry.left("inputs", "neither a PDF that has them inside nor the files themselves are given")
-    elif given.pdf is None and not sound:
-        inquiry.left("inputs", f"not given: {', '.join(sorted(wanted.keys() - files.keys()))}")
+    elif given.pdf is None and (lacking := wanted.keys() - files.keys()):
+        inquiry.left("inputs", f"not given: {', '.join(sorted(lacking))}")
     if entry := data.get("posterior"):
         draws = str(entry["file"])
         inquiry.looked("inputs", draws in files)

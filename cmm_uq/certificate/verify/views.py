@@ -168,7 +168,7 @@ def _compare(inquiry: Inquiry, name: str, content: bytes, should: bytes, source:
     for path, stands, wanted in found:
         inquiry.wrong("forms", name, path, f"is not what {source} says", stands, wanted)
     if not found and not any(map(_is_signature, (*root.children, *wished.children))):
-        problem = "is written otherwise, though it says the same: it is not the file that was made"
+        problem = f"is written otherwise than {source} gives it, though it says the same: one of them was changed"
         inquiry.wrong("forms", name, "", problem)
 
 

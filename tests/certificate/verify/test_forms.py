@@ -21,7 +21,7 @@ from cmm_uq.app.commands.certificates.verification import Verification
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.base.errors import CmmUqError, NotInstalledError, OutputError
 from cmm_uq.certificate.verify.again import Again, beyond_sampling, by_other_kernels, differences
-from cmm_uq.certificate.verify.given import canonical
+from cmm_uq.certificate.verify.texts import canonical
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import shutil
+import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,11 +14,14 @@ from typing import Any
 import pikepdf
 import pytest
 
+from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import PDF_UNPACKED
 from cmm_uq.certificate.verify import opened
-from cmm_uq.certificate.verify.given import Given, Inquiry, canonical, check_files, read_given, strict_json
+from cmm_uq.certificate.verify.given import Given, Inquiry, check_files, read_given
 from cmm_uq.certificate.verify.opened import PdfFile, read_html, read_pdf
+from cmm_uq.certificate.verify.texts import canonical, strict_json
+from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize(("content", "told"), [
@@ -166,3 +171,91 @@ def test_a_link_a_second_pdf_and_what_is_no_certificate_are_refused(certificate:
                         ([note], "nothing given is a certificate"), ([tmp_path / "none.pdf"], "no such file")):  # fmt: skip
         with pytest.raises(CmmUqError, match=told):
             read_given(paths)
+
+
+ENDS: list[Callable[[bytes], bytes]] = [
+    lambda content: content.replace(b"\n", b"\r\n"),
+    lambda content: b"\xef\xbb\xbf" + content,
+    lambda content: b"\xef\xbb\xbf" + content.replace(b"\n", b"\r\n"),
+]
+
+
+@pytest.mark.parametrize("rewritten", ENDS)
+def test_line_ends_that_were_changed_on_the_way_are_no_alteration(
+    certificate: Path, rewritten: Callable[[bytes], bytes]
+) -> None:
+    """As git, an editor or e-mail of Windows changes them, of documents and of inputs beside them."""
+    job = ROOT / "examples" / "iota-1102-20C"
+    for name in ("job.toml", "ballbar.csv"):
+        (certificate / name).write_bytes(rewritten((job / name).read_bytes()))
+    for name in ("certificate.html", "results.json"):
+        (certificate / name).write_bytes(rewritten((certificate / name).read_bytes()))
+    found = verify([certificate], rerun=False).inquiry
+    assert (found.word, found.findings) == ("NOT WHOLLY CHECKED", [])
+    names = "ballbar.csv, certificate.html, job.toml, results.json"
+    assert [one.why for one in found.unchecked if one.what == f"{names} to the byte"]
+
+
+def test_a_digit_is_found_whatever_line_ends_it_comes_with(certificate: Path) -> None:
+    content = (ROOT / "examples" / "iota-1102-20C" / "ballbar.csv").read_bytes().replace(b"\n", b"\r\n")
+    (certificate / "ballbar.csv").write_bytes(content.replace(b"1", b"2", 1))
+    found = verify([certificate], rerun=False).inquiry
+    assert "ballbar.csv" in {one.file for one in found.findings}
+
+
+def test_one_line_end_that_differs_is_no_other_way_of_writing(certificate: Path) -> None:
+    path = certificate / "results.json"
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n", 1))
+    assert verify([certificate], rerun=False).inquiry.word == "NOT VERIFIED"
+
+
+def test_what_windows_puts_into_a_folder_is_passed_over(made: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "folder"))
+    for name in ("Thumbs.db", "desktop.ini"):
+        (folder / name).write_bytes(b"1")
+    assert verify([folder], rerun=False).inquiry.findings == []
+    (folder / "another.ini").write_bytes(b"1")
+    assert "does not name another.ini" in str(verify([folder], rerun=False).inquiry.findings[0])
+
+
+def test_one_file_may_be_given_twice(certificate: Path, tmp_path: Path) -> None:
+    pdf = certificate / "certificate.pdf"
+    assert verify([certificate, pdf], rerun=False).inquiry.findings == []
+    other = tmp_path / pdf.name
+    other.write_bytes(pdf.read_bytes() + b"\n")
+    with pytest.raises(CmmUqError, match="there are two files"):
+        verify([certificate, other], rerun=False)
+
+
+def test_what_cannot_be_given_is_refused_in_words(made: Path, tmp_path: Path) -> None:
+    packed = tmp_path / "certificate.zip"
+    with zipfile.ZipFile(packed, "w") as archive:
+        archive.write(made / "certificate.pdf", "certificate.pdf")
+    link = tmp_path / "link"
+    link.symlink_to(made, target_is_directory=True)
+    for path, problem in (
+        (packed, "nothing given is a certificate. Unpack"),
+        (link, f"a link, .* Give what it leads to: {made.resolve()}"),
+        (tmp_path / f"{'long' * 80}.pdf", "cannot be read: File name too long"),
+    ):
+        with pytest.raises(CmmUqError, match=problem):
+            verify([path])
+
+
+@pytest.mark.parametrize("packing", [
+    {"linearize": True}, {"object_stream_mode": pikepdf.ObjectStreamMode.generate},
+])  # fmt: skip
+def test_a_pdf_that_another_program_saved_is_called_so(made: Path, packing: dict[str, Any]) -> None:
+    out = io.BytesIO()
+    with pikepdf.open(made / "certificate.pdf") as pdf:
+        pdf.save(out, **packing)
+    with pytest.raises(CmmUqError, match="was saved anew by another program"):
+        read_pdf(out.getvalue(), "certificate.pdf")
+
+
+def test_results_taken_out_of_a_pdf_are_missed(made: Path) -> None:
+    def without(pdf: pikepdf.Pdf) -> None:
+        del pdf.attachments["results.json"]
+        pdf.Root.AF = pikepdf.Array([spec for spec in pdf.Root.AF if str(spec.UF) != "results.json"])
+
+    assert "attachment results.json: is missing, and provenance.json names it" in named(saved(made, without))

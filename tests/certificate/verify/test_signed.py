@@ -6,6 +6,7 @@ import datetime as dt
 import sys
 from pathlib import Path
 
+import pikepdf
 import pytest
 
 pytest.importorskip("pyhanko")
@@ -212,3 +213,15 @@ def test_the_digital_certificate_is_held_to_the_schema_where_one_is_given(made: 
 def test_a_folder_without_schemas_is_refused(made: Path, again: Again, tmp_path: Path) -> None:
     with pytest.raises(CmmUqError, match="no schema of DCC"):
         verify([made], schema=tmp_path, compute=lambda given, job: again)
+
+
+@pytest.mark.long
+def test_a_signed_pdf_that_was_saved_anew_has_no_revisions_of_number_nought(
+    signed: Path, again: Again, trusted: list[Path]
+) -> None:
+    pdf = signed / "certificate.pdf"
+    with pikepdf.open(pdf, allow_overwriting_input=True) as opened:
+        opened.save(object_stream_mode=pikepdf.ObjectStreamMode.disable)
+    said = [str(one) for one in inquiry(signed, again, trusted).findings if one.check == "signatures"]
+    assert [one for one in said if "does not fit the file" in one]
+    assert not [one for one in said if "0 revisions" in one]

@@ -17,6 +17,7 @@ import pytest
 from cmm_uq.app.commands.certificates.signing import Signing, sign_files
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
+from cmm_uq.app.commands.laboratory.records import import_reports
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify.given import Inquiry
@@ -194,6 +195,20 @@ def test_records_that_are_shorter_or_others_are_told_apart(laboratory: Path, tmp
             others.append("sent", {"turn": turn})
     shutil.copy(tmp_path / "others.db", laboratory / PLACE)
     assert told(held_to(laboratory))[0].endswith("they were rewritten, or they are others")
+
+
+def test_a_certificate_of_another_laboratory_may_have_been_imported(laboratory: Path, tmp_path: Path) -> None:
+    """Records that were put together of two laboratories were not rewritten, and not made empty."""
+    with open_records(tmp_path / "merged.db", create=True) as merged:
+        for turn in range(2):
+            merged.append("sent", {"turn": turn})
+        import_reports(merged, [laboratory / "reports"])
+    shutil.copy(tmp_path / "merged.db", laboratory / PLACE)
+    (problem,) = told(held_to(laboratory))
+    assert problem.endswith("they were rewritten, or the certificate, their entry 4, was imported from others")
+    first = verify([laboratory / "reports" / "mount"], rerun=False, records=laboratory / PLACE).inquiry
+    assert first.findings == []
+    assert "it says that they were empty, and is their entry 3" in "".join(map(str, first.unchecked))
 
 
 def test_a_certificate_whose_own_entry_was_left_out_is_missed(laboratory: Path) -> None:

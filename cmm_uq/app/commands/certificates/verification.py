@@ -63,6 +63,11 @@ def verify_given(
     _check_schema(inquiry, given)
     views.open_digital(inquiry, given)
     files.check_files(inquiry, given)
+    if given.rewritten:
+        why = (
+            "line ends, or a mark at the beginning, are others than they were issued with; nothing else was passed over"
+        )
+        inquiry.left(f"{', '.join(given.rewritten)} to the byte", why)
     stage("Comparing the forms", 0.1)
     trusted = None
     if trust is not None:
