@@ -7,6 +7,7 @@ Exit codes: 0 done; 2 bad input; 3 output impossible; 4 done, and not conforming
 
 from __future__ import annotations
 
+import errno
 import gc
 import os
 import sys
@@ -99,6 +100,9 @@ def run_command() -> int:
         elif isinstance(fault, PermissionError) and fault.filename:  # asked about; who writes refuses in its own words
             where, fix = str(fault.filename), "Mend the permissions of it and of its folders"
             error, code = CmmUqError("cannot be read: Permission denied", where=where, fix=fix), BAD_INPUT
+        elif isinstance(fault, OSError) and fault.errno == errno.ENAMETOOLONG:  # whatever option it was of
+            where = str(fault.filename or "")
+            error, code = CmmUqError("is too long a name", where=where, fix="Give a shorter one"), BAD_INPUT
         else:
             state = f"The files are written in {', '.join(map(str, written()))}" if written() else "Nothing was written"
             problem = f"a fault of the program: {type(fault).__name__}: {fault}"

@@ -119,6 +119,16 @@ def test_an_unwritable_folder_is_refused_before_anything_is_computed(iota: Path,
     assert "Permission denied" in process.stderr
 
 
+@pytest.mark.parametrize(
+    "line",
+    [("check",), ("report",), ("report", "job", "--out"), ("batch",), ("verify",), ("verify", "job", "--trust")],
+)
+def test_a_name_that_is_too_long_is_refused_in_words(job: Path, line: tuple[str, ...]) -> None:
+    process = run(*(job if word == "job" else word for word in line), job.parent / ("long" * 80))
+    assert process.returncode == (3 if "--out" in line else 2)
+    assert re.search(": (is too long a name|cannot be .*: File name too long)", process.stderr)
+
+
 def test_a_file_where_the_folder_should_be_is_refused(iota: Path, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
     process = run("report", iota, "--out", tmp_path / "out")
