@@ -121,7 +121,7 @@ def test_an_unwritable_folder_is_refused_before_anything_is_computed(iota: Path,
 
 @pytest.mark.parametrize(
     "line",
-    [("check",), ("report",), ("report", "job", "--out"), ("batch",), ("verify",), ("verify", "job", "--trust")],
+    [("check",), ("report",), ("report", "job", "--out"), ("batch",), ("verify",), ("records", "verify", "--records")],
 )
 def test_a_name_that_is_too_long_is_refused_in_words(job: Path, line: tuple[str, ...]) -> None:
     process = run(*(job if word == "job" else word for word in line), job.parent / ("long" * 80))
