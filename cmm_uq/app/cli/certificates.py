@@ -49,7 +49,7 @@ def verify(
         from cmm_uq.app.commands.certificates.verify import verify
 
         found = verify(files, rerun=rerun, trust=trust or None, schema=schema, records=records, stage=stage)
-    data = {"schema": "cmm-uq/verification/1", "subject": found.subject, **found.inquiry.as_data()}
+    data = {"schema": "cmm-uq/verification/1", "subject": found.subject, "said": found.said, **found.inquiry.as_data()}
     left = terminal.NOT_WHOLLY_CHECKED if found.inquiry.unchecked else 0
     end.put(data, _verified(found, verbose=end.verbose), terminal.NOT_VERIFIED if found.inquiry.findings else left)
 
@@ -59,7 +59,7 @@ def _verified(found: Verification, *, verbose: bool) -> list[str]:
 
     inquiry = found.inquiry
     shown = inquiry.findings if verbose else inquiry.findings[:FINDINGS_SHOWN]
-    lines = [f"{inquiry.word}  {found.subject}", *(f"  {one}" for one in shown)]
+    lines = [f"{inquiry.word}  {found.subject}", f"  {printable(found.said)}", *(f"  {one}" for one in shown)]
     if more := len(inquiry.findings) - len(shown):
         lines.append(f"  and {more} more: --verbose shows all")
     lines += [f"  not checked: {left}" for left in inquiry.unchecked]

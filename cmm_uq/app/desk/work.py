@@ -29,14 +29,12 @@ from cmm_uq.app.commands.parts.new import PART, Answers, certificate_files, part
 from cmm_uq.app.commands.parts.part import PartOptions, write_part
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.app.desk import exports, questions
-from cmm_uq.app.serve import page as p
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of, value_of
 from cmm_uq.base.output import Owner
 from cmm_uq.base.output.interruption import done, watch
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.verify.given import CHECKS
-from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import is_part
 from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED
 
@@ -116,40 +114,21 @@ def vectors(written: Written[Outcome]) -> dict[str, Any] | None:
 def verification(path: str) -> dict[str, Any]:
     """What a certificate says, on what it rests, and whether it holds, as ``cmm-uq verify --no-rerun`` finds it."""
     found = verify((Path(path),), rerun=False)
-    inquiry, given = found.inquiry, found.given
+    inquiry = found.inquiry
     checks = [
         [any(one.check == name for one in inquiry.findings), what, inquiry.done.get(name, 0)]
         for name, what in CHECKS.items()
         if inquiry.done.get(name) or any(one.check == name for one in inquiry.findings)
     ]
     signed = next((note for note in inquiry.notes if "sign" in note.lower()), "Nobody has signed it electronically.")
-    decided = ((given.results[1].get("verdicts") or {}) if given.results is not None else {}).get("overall", "none")
     return {
         "word": inquiry.word,
-        "said": _said(found.subject, found.job, str(decided)),
+        "said": found.said,
         "signed": signed,
         "checks": checks,
         "findings": [str(one) for one in inquiry.findings],
         "unchecked": [str(one) for one in inquiry.unchecked],
     }
-
-
-def _said(subject: str, job: Job | None, decided: str) -> str:
-    """In one line who says what, and what it rests on."""
-    decision = p.DECISIONS.get(decided, p.DECISIONS["none"])[0]
-    if job is None:
-        return f"{subject}: {decision}"
-    facts, artefact = job.facts, job.facts.artefact
-    who = facts.laboratory.name or "A laboratory that is not named"
-    machine = f"{facts.machine.name}{f' ({facts.machine.serial})' if facts.machine.serial else ''}"
-    chain = artefact.certificate
-    by = (
-        f", certificate {chain.number} by {chain.laboratory}"
-        if chain is not None and chain.number
-        else ", whose certificate is not named"
-    )
-    rests = f"{artefact.name or artefact.kind}{f' {artefact.serial}' if artefact.serial else ''}{by}"
-    return f"{who} says of {machine}, measured on {facts.job.date}: {str(decision).lower()}. It rests on {rests}."
 
 
 DOES: Mapping[str, Callable[..., Any]] = {

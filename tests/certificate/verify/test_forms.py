@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -326,4 +327,6 @@ def test_the_exit_code_says_what_came_out(certificate: Path) -> None:
     run = CliRunner().invoke(app, ["verify", str(certificate), "--no-rerun"])
     assert run.exit_code == NOT_VERIFIED
     assert run.stdout.startswith("NOT VERIFIED")
+    said = run.stdout.splitlines()[1]
+    assert re.fullmatch(r"  .+ says of .+ \((measured|simulated), [\d-]+\): .+\. It rests on .+\.", said), said
     assert "conformity[0].decision: does not follow from what was decided: “pass” instead of “fail”" in run.stdout

@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.document import WORDS
 from cmm_uq.certificate.verify import given as files, sources, views
 from cmm_uq.certificate.verify.given import AGAIN, NOT_ASKED, RESULTS, Given, Inquiry
+from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.laboratory.records.opening import open_records
 
 if TYPE_CHECKING:
@@ -41,6 +43,28 @@ class Verification:
         if self.given.pdf is not None and (title := self.given.pdf[1].information.get("/Title")):
             return " ".join(title.split())
         return str(self.given.results[1]["job"]["id"]) if self.given.results is not None else ""
+
+    @property
+    def said(self) -> str:
+        """In one line who says what of which machine, and what it rests on: what the certificate claims."""
+        verdicts = ((self.given.results[1].get("verdicts") or {}) if self.given.results is not None else {}) or {}
+        decided = str.__str__(WORDS[word]).lower() if (word := str(verdicts.get("overall"))) in WORDS else ""
+        if self.job is None:
+            return f"{self.subject}: {decided or 'no conformity is stated'}"
+        facts, artefact, chain = self.job.facts, self.job.facts.artefact, self.job.facts.artefact.certificate
+        who = facts.laboratory.name or "A laboratory that is not named"
+        machine = f"{facts.machine.name}{f' ({facts.machine.serial})' if facts.machine.serial else ''}"
+        when = f"{'measured' if facts.job.origin == MEASURED else facts.job.origin}, {facts.job.date}"
+        standards = f" by {', '.join(dict.fromkeys(one.standard for one in facts.conformity))}" if decided else ""
+        rests = f"{artefact.name or artefact.kind}{f' {artefact.serial}' if artefact.serial else ''}"
+        issued = f" by {chain.laboratory}" if chain is not None and chain.laboratory else ""
+        by = (
+            f"certificate {chain.number}{issued}"
+            if chain is not None and chain.number
+            else "whose certificate is not named"
+        )
+        outcome = f"{decided}{standards}" if decided else "states figures, and no conformity"
+        return f"{who} says of {machine} ({when}): {outcome}. It rests on {rests}, {by}."
 
 
 # the job of the inputs, and what computes all again: whether documents are the same to the byte; ``None`` without sound inputs
