@@ -20,7 +20,8 @@ from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_pa
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.maths.inference.families import USUAL, Effort, FieldModel, FieldSizes, sample_sizes
+from cmm_uq.maths.inference.families import FieldModel
+from cmm_uq.maths.inference.family_sizes import USUAL, Effort, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.noise import Sizes
 from tests.part_machines import by_certificate, plate_of
 
@@ -59,7 +60,9 @@ def sampled_once(
 ) -> FieldSizes:
     """Sizes of a machine's errors and noise, sampled once for all tests that are not about sampling them again."""
     columns = [one.columns for one in model.errors]
-    key = hashlib.sha256(pickle.dumps((model.linear, model.noise, columns, draws, seed, known, effort))).digest()
+    key = hashlib.sha256(
+        pickle.dumps((model.linear, model.noise, columns, model.limit, draws, seed, known, effort))
+    ).digest()
     if key not in _SIZES:
         _SIZES[key] = sample_sizes(model, draws, seed, known, effort)
     return _SIZES[key]

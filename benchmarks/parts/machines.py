@@ -27,7 +27,8 @@ from benchmarks.parts import truth
 from benchmarks.parts.known_noise import joint_posterior
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise, white
-from cmm_uq.analysis.machine.recordings import FurtherRecording, FurtherRecordings
+from cmm_uq.analysis.machine.passed import LengthsUnderTest, passed_test, prescribed
+from cmm_uq.analysis.machine.recordings import CONTRADICTED, FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.regions import with_readings
 from cmm_uq.analysis.machine.state import MachineState, StatedNoise, unmodelled_errors, with_curves
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
@@ -35,7 +36,6 @@ from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.plan import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
-from cmm_uq.app.commands.certificates.further import CONTRADICTED
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Machine
@@ -54,6 +54,7 @@ BAR_MM, U_BAR_UM = 400.0, 0.5
 GAUGE_MM, U_GAUGE_UM = 800.0, 0.4
 FACES = {"step gauge": 6, "dense gauge": 41}
 """On each of the seven lines of a gauge."""
+U_TEST_UM, MPE_K = 0.5, 750.0  # of a tested length; mm in which a permissible error grows by itself
 PART = Expansion(11.5e-6, 1e-6, 21.0, 0.3)
 
 
@@ -155,11 +156,14 @@ def on_machine(
     sigma: float,
     machine: Machine = MACHINE,
     beside: Sequence[str] = (),
+    *,
+    tested: bool | None = None,
 ) -> dict[str, Any]:
     """A machine with a hidden truth, calibrated, corrected, measuring the part.
 
     ``sigma``: its noise, mm. ``machine``: as it is known, its axes read as is stated. ``beside``: artefacts of further
-    certificates, in order; how probable each is by those before is kept, and one that is not is left out.
+    certificates, in order; how probable each is by those before is kept, and one that is not is left out. ``tested``: whether
+    a test of lengths that the corrected machine passed is stated besides; ``None`` for no test, which is made else anyhow.
     """
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
@@ -179,14 +183,23 @@ def on_machine(
         if chances[-1] >= CONTRADICTED:
             taken.append(found)
             state = given_recording(certificate, model, given, TRIALS, seed, beside=FurtherRecordings(tuple(taken)))
+    corrected = truth.Truth.of_six(dict(zip(truth.SIX, mean, strict=True)))
+    if tested is not None:
+        lengths, errors = truth.tested_lengths(hidden, corrected, sigma, U_TEST_UM, random)
+        times = float(np.max(np.abs(errors) / (1 + lengths / MPE_K)[:, None])) / float(random.uniform(0.4, 1.0))
+        artefact = LengthsUnderTest(prescribed(machine), machine, bidirectional=True)
+        limit, u = times * (1 + artefact.nominal / MPE_K), np.full(len(artefact.nominal), 1e-3 * U_TEST_UM)
+        keys = [(effect.name, one.name) for effect in NAMED for one in effect.coefficients]
+        corrects = dict(zip(keys, mean.tolist(), strict=True))
+        found = replace(passed_test(model, artefact, limit, u, sigma, 3), corrections=corrects)
+        chances.append(found.passing(state))
+        if tested and chances[-1] >= CONTRADICTED:
+            state = given_recording(certificate, model, given, TRIALS, seed, beside=FurtherRecordings((*taken, found)))
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
     ) - PART.cte_per_k * (PART.temperature_c - 20)
     pose = placed(random)
-    part, corrected = (
-        truth.made_part(random, made.place_um, made.form_um),
-        truth.Truth.of_six(dict(zip(truth.SIX, mean, strict=True))),
-    )
+    part = truth.made_part(random, made.place_um, made.form_um)
     measuring = truth.Measuring(hidden, corrected, pose.rotation, pose.translation_mm, float(np.hypot(sigma, offset)),
                                 1e-3 * U_TIP_UM * float(random.standard_normal()), float(growth))  # fmt: skip
     normals = np.concatenate([normal for _, normal in truth.nominal_part().values()])
@@ -202,7 +215,7 @@ def on_machine(
     return {
         "intervals": rows,
         **({"denied": denied} if machine.read_by else {}),
-        **({"chances": chances} if beside else {}),
+        **({"chances": chances} if chances else {}),
         "sigma_um": round(1e3 * sigma, 3),
         "offset_um": round(1e3 * offset, 3),
     }

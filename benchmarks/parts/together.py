@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.coverage.measuring import counted
 from benchmarks.parts import curved, machines
-from cmm_uq.app.commands.certificates.further import CONTRADICTED
+from cmm_uq.analysis.machine.recordings import CONTRADICTED
 
 BEGIN, END = "<!-- written by benchmarks.parts.together -->", "<!-- end of together -->"
 SORTS = [sort for sort in curved.SORTS if sort.name in ("ordinary", "periodic", "play", "crashed")]

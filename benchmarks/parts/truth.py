@@ -169,6 +169,28 @@ def step_gauge(
     return Recording(xyz, whole["m"], whole["p"], whole["r"], columns)
 
 
+def tested_lengths(
+    truth: Truth, corrected: Truth, sigma: float, u_um: float, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Five lengths on each of seven lines near the middle, three times over (ISO 10360-2): lengths (35,), errors (35, 3), mm.
+
+    Lines lie up to a twentieth of the travel beside its middle, and along themselves; of ``u_um`` half is common to all.
+    """
+    size, lengths, errors = np.ptp(TRAVEL, axis=1), list[float](), list[np.ndarray]()
+    for whole in [np.array([x, y, 1.0]) * size for x in (1, -1) for y in (1, -1)] + list(np.diag(size)):
+        along, longest = unit(whole), 0.66 * float(np.linalg.norm(whole))
+        start = TRAVEL.mean(axis=1) - 0.5 * longest * along + 0.05 * size * random.uniform(-1, 1, 3)
+        travel = np.where(np.abs(along) > 1e-6, np.sign(along), 0.0)
+        for length in np.linspace(30.0, longest, 5):
+            ends = np.array([start, start + length * along])
+            approach = np.array([travel, -travel])
+            shown = corrected.true(truth.read(ends, np.zeros(3), approach), np.zeros(3), np.zeros((2, 3)))
+            lengths.append(float(length))
+            errors.append(np.linalg.norm(shown[1] - shown[0]) - length + np.sqrt(2) * sigma * random.standard_normal(3))
+    off = 1e-3 * u_um * (random.standard_normal() + random.standard_normal((35, 1))) / np.sqrt(2)
+    return np.array(lengths), np.array(errors) + off
+
+
 @dataclass(frozen=True, eq=False)
 class Measuring:
     """A part measured on a machine that corrects what its certificate estimates.

@@ -20,6 +20,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, day, li
 from cmm_uq.base.plugins import KINDS, STANDARDS, versions
 from cmm_uq.certificate.document import Document, Table, table
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.machine_state import PassedFacts
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED, Origin
 from cmm_uq.machine.physics.catalogue import plugins
 from cmm_uq.maths.inference.draws import Draws
@@ -212,6 +213,17 @@ class FurtherCertificate:
 
 
 @dataclass(frozen=True)
+class PassedTest:
+    """A test of lengths that the machine passed, as a job states it."""
+
+    facts: PassedFacts
+    lengths: int
+    chance: float  # the least of a length to keep its limit, by the machine as its recordings have it
+    used: bool
+    u_without: tuple[float, ...] = ()  # u of each characteristic without this and other tests, over that with them
+
+
+@dataclass(frozen=True)
 class FurtherCertificates:
     each: tuple[FurtherCertificate, ...] = ()
     warnings: tuple[Text, ...] = ()
@@ -241,6 +253,21 @@ def further_table(certificates: Sequence[FurtherCertificate]) -> Table | None:
         used = say("yes") if one.used else say("no")
         rows.append((*named, number(one.observations), number(one.chance, ".2g"), used))
     return table(say("Further certificates of the machine"), [*heads, *figures], rows)
+
+
+def passed_data(tests: Sequence[PassedTest]) -> dict[str, Any]:
+    """Of results.json: ``passed``, nothing where there is none."""
+    told = [
+        {
+            "stated": one.facts.model_dump(mode="json"),
+            "lengths": one.lengths,
+            "least_chance": one.chance,
+            "used": one.used,
+            "u_without": list(one.u_without),
+        }
+        for one in tests
+    ]
+    return {"passed": told} if told else {}
 
 
 def further_data(certificates: Sequence[FurtherCertificate]) -> dict[str, Any]:

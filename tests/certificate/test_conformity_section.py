@@ -18,7 +18,8 @@ from cmm_uq.certificate.document import DecisionBlock, Document, Plot, Table
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.sections.conformity import budget_table, conformity_section, decision_block, formula
 from cmm_uq.jobs.reports import AsFound
-from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError, Prior
+from cmm_uq.jobs.tables.conformity import ConformityFacts, Prior
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty

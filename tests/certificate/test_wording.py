@@ -19,7 +19,8 @@ from cmm_uq.certificate.result import NoiseComponent, RecordingNoise
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.sections.method import noise_found
 from cmm_uq.certificate.wording import expanded, figure_row, measured, probability, title_of, with_uncertainty
-from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
+from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.quantity import Quantity, nominal

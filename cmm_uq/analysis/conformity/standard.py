@@ -148,10 +148,7 @@ class Test:
             return np.asarray(angle * ARCSECOND * lengths_mm / MICROMETRE, dtype=np.float64)
         if mpe is None:
             return np.full(len(lengths_mm), self.facts.limit_um, dtype=np.float64)
-        most = np.full(len(lengths_mm), np.inf if mpe.b_um is None else mpe.b_um)
-        if mpe.a_um is None or mpe.k is None:
-            return most
-        return np.asarray(np.minimum(mpe.a_um + lengths_mm / mpe.k, most), dtype=np.float64)
+        return mpe.at(lengths_mm)
 
     def limit_um(self, length_mm: float) -> float:
         return float(self.limits_um(np.array([length_mm]))[0])

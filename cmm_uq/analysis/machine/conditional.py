@@ -30,17 +30,8 @@ from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
-from cmm_uq.maths.inference.families import (
-    HELD,
-    USUAL,
-    Effort,
-    FieldErrors,
-    FieldModel,
-    FieldSizes,
-    log_evidence,
-    normal,
-    sample_sizes,
-)
+from cmm_uq.maths.inference.families import FieldErrors, FieldModel, normal
+from cmm_uq.maths.inference.family_sizes import HELD, USUAL, Effort, FieldSizes, log_evidence, sample_sizes
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import Cause, Doubt, sample_with_noise
 
@@ -78,7 +69,8 @@ class RecordedField:
         # where the artefact stands, not what was read: noise of readings would explain itself
         points = [each.artefact.points.at(each.where(each.estimate().about)) for each in models]
         errors = [_errors(models, further[i].effect, points, learned) for i in which]
-        whole = FieldModel(*recordings.stacked(model, beside), (*errors, *_own(models, beside, in_doubt)))
+        limit = np.concatenate([np.zeros(0), *(one.limit for one in beside)])
+        whole = FieldModel(*recordings.stacked(model, beside), (*errors, *_own(models, beside, in_doubt)), limit)
         effects, sds = list[Effect](), [np.zeros(0)]
         for i, one in zip(which, errors, strict=True):
             effect = further[i].effect
@@ -92,9 +84,11 @@ class RecordedField:
         modelled = sum(len(effect.coefficients) for effect in model.effects)
         return cls(whole, modelled, which, tuple(effects), np.concatenate(sds))
 
-    def coefficients(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
+    def coefficients(
+        self, sizes: Sizes, scales: Floats, random: np.random.Generator, within: Floats | None = None
+    ) -> Floats:
         """Exact draws (N, k + f) of the calibration's effects, then of what it left out, for N sizes of noise and families."""
-        drawn, start = self.field.draw(sizes, scales, random), len(self.field.linear.unknowns)
+        drawn, start = self.field.draw(sizes, scales, random, within), len(self.field.linear.unknowns)
         others = drawn[:, start : start + len(self.sd)]
         others *= self.sd
         return np.hstack([drawn[:, : self.modelled], others])
@@ -212,7 +206,7 @@ def given_recording(
     sizes = _sizes(whole, model, draws, seed, known, effort)
     if known is None:
         noise = stated_noise(model, whole.field.noise, sizes.noise)
-    drawn, k = whole.coefficients(sizes.noise, sizes.families, random), whole.modelled
+    drawn, k = whole.coefficients(sizes.noise, sizes.families, random, sizes.within), whole.modelled
     drawn[:, :k] = doubted_draws(doubt, len(model.unknowns), np.arange(k), seed, drawn[:, :k])
     together = _with(state, model, whole, drawn, noise)
     scales = dict(zip(whole.field.families, sizes.families.T, strict=True))

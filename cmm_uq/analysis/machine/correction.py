@@ -31,7 +31,7 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
 from cmm_uq.machine.physics.kinematics import SQUARENESSES, KinematicChain, carried_offset
 from cmm_uq.machine.physics.map_interpolation import MapCovariance
-from cmm_uq.maths.inference.families import FOLD, sample_sizes
+from cmm_uq.maths.inference.family_sizes import FOLD, sample_sizes
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
 

@@ -10,13 +10,14 @@ that of the first is sampled together with the errors' sizes.
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
 
-from cmm_uq.analysis.machine.state import MachineState, of_machine
+from cmm_uq.analysis.machine.state import Change, MachineState, changes, of_machine
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.field import GivenPeriod, linear as trials
@@ -27,6 +28,8 @@ from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearMo
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.posterior import Cause, Doubt
 
+# chance of a recording that contradicts a machine as much, below which it is taken to be of another state of the machine
+CONTRADICTED = 1e-3
 _NO_NOISE = 1e-12  # part of the variance of a reading of the first recording that is none in another
 
 
@@ -37,6 +40,8 @@ class FurtherRecording:
     # by effect and coefficient: root mean square change between the recordings, and what the machine corrected during this one
     change: Mapping[tuple[str, str], float] = field(default_factory=dict)
     corrections: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    # (m,) mm, where no more is known of its observations than that each is so near to zero; such stand behind all others
+    limit: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def linear(self) -> LinearModel:
@@ -51,19 +56,25 @@ class FurtherRecording:
         found = self.model.estimate().linear
         return np.asarray(found.design * [self.change.get(one.key, 0.0) for one in found.unknowns])
 
+    def on_its_day(
+        self, state: MachineState, on: dt.date, change: Change | None, *, corrected: bool
+    ) -> tuple[FurtherRecording, bool]:
+        """With what the machine changed between that day and its calibration; whether that is known of every error."""
+        keys = [(effect.name, one.name) for effect in state.effects for one in effect.coefficients]
+        days = abs((on - state.calibrated).days) if state.calibrated else 0
+        each = [size for effect in state.effects for size in changes(effect, days, change)]
+        changed = {key: size for key, size in zip(keys, each, strict=True) if size}
+        corrects = dict(zip(keys, state.corrects.tolist(), strict=True)) if corrected else {}
+        return replace(self, change=changed, corrections=corrects), not (days and None in each)
+
     def contradiction(self, state: MachineState) -> float:
         """Chance, by the machine as it is known without this recording, of one that deviates as much from it.
 
         As a whole (χ²), or as a change of one of the named errors would make it deviate; no less than the true chance
         (Bonferroni). Errors that no recording has shown yet are as large as they may be.
         """
-        model, linear = self.model, self.linear
-        foretold, start = np.zeros((len(state.draws), len(linear.observed))), 0
-        for effect in state.effects:
-            own = state.draws[:, start : start + len(effect.coefficients)]
-            start += len(effect.coefficients)
-            foretold += own @ shown_by(model, effect).T
-        unseen = [shown_by(model, whole) * sd_of(whole) for whole in (trials(one.effect) for one in state.unmodelled)]
+        linear = self.linear
+        foretold, unseen = self._foretold(state)
         named = {(one.name, each.name) for one in state.effects for each in one.coefficients}
         others = np.array([one.key not in named for one in linear.unknowns], dtype=bool)
         known = others & np.isfinite(linear.prior_sd)
@@ -71,7 +82,7 @@ class FurtherRecording:
         free = np.hstack([linear.freedoms.dense(), open_])
         into = scipy.linalg.null_space(free.T) if free.size else np.eye(len(free))
         left = (linear.observed - linear.design[:, known] @ linear.prior_mean[known] - foretold.mean(axis=0)) @ into
-        doubt = np.hstack([linear.design[:, known] * linear.prior_sd[known], self.changed, self.noise, *unseen])
+        doubt = np.hstack([linear.design[:, known] * linear.prior_sd[known], self.changed, self.noise, unseen])
         covariance = into.T @ (np.cov(foretold.T) + doubt @ doubt.T) @ into
         columns = np.column_stack([left, into.T @ linear.design[:, ~others]])
         gain = scipy.linalg.solve(covariance, columns, assume_a="pos")
@@ -80,6 +91,24 @@ class FurtherRecording:
         whole = float(scipy.special.chdtrc(len(left), size[0]))
         each = scipy.special.chdtrc(1, (left @ gain[:, seen]) ** 2 / size[seen])
         return min(1.0, 2 * min(whole, len(seen) * float(each.min()) if len(seen) else 1.0))
+
+    def passing(self, state: MachineState) -> float:
+        """The least chance of an observation to keep its limit, by the machine as it is known without this recording."""
+        foretold, unseen = self._foretold(state)
+        sd = np.linalg.norm(np.hstack([self.changed, self.noise, unseen]), axis=1)
+        ends = ((sign * self.limit - foretold + self.linear.observed) / sd for sign in (1, -1))
+        above, below = (scipy.special.ndtr(end).mean(axis=0) for end in ends)
+        return float(np.min(above - below))
+
+    def _foretold(self, state: MachineState) -> tuple[Floats, Floats]:
+        """Draws (N, m) of the observations by a machine's errors, and (m, j) for what no recording has shown of these."""
+        found, start = np.zeros((len(state.draws), int(self.model.used.sum()))), 0
+        for effect in state.effects:
+            own = state.draws[:, start : start + len(effect.coefficients)]
+            start += len(effect.coefficients)
+            found += own @ shown_by(self.model, effect).T
+        each = (trials(one.effect) for one in state.unmodelled)
+        return found, np.hstack([found[:0].T, *(shown_by(self.model, whole) * sd_of(whole) for whole in each)])
 
 
 def doubted(model: RecordingModel, causes: Iterable[Cause]) -> Floats:

@@ -46,7 +46,7 @@ from cmm_uq.machine.model.readings import AxisReading
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import HYSTERESIS, PeriodicScale
 from cmm_uq.machine.physics.superposition import About
-from cmm_uq.maths.inference.families import BRIEF, FieldSizes, sample_sizes
+from cmm_uq.maths.inference.family_sizes import BRIEF, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

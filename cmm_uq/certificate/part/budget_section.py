@@ -16,6 +16,7 @@ from cmm_uq.base.messages import (
     Verbatim,
     after,
     commas,
+    day,
     holding,
     number,
     plural,
@@ -28,6 +29,7 @@ from cmm_uq.certificate.document import Column, Paragraph, Section, Table, secti
 from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
+from cmm_uq.certificate.sections.conformity import mpe_words
 from cmm_uq.certificate.sections.regions import (
     UNMOVED,
     changes_table,
@@ -241,11 +243,12 @@ def priors_section(found: PartMeasurement) -> Section:
     """Sizes of the families, and what would change with other priors."""
     title = say("What the recording says of the machine's errors, and what it does not")
     read_by = readings_table(found.given.machine.machine, found.given.machine.statements)
+    stated = read_by, _stated_bounds(found), _passed_tests(found)
     if not found.influence:
-        return section(title, read_by, _stated_bounds(found))
+        return section(title, *stated)
     told = Paragraph(priors_words(found), "warning" if resting_on_priors(found) else "plain")
     changes = changes_table(found.influence, [Verbatim(one.name) for one in found.characteristics])
-    return section(title, told, sizes_table(found.given.machine.scales), read_by, _stated_bounds(found), changes)
+    return section(title, told, sizes_table(found.given.machine.scales), *stated, changes)
 
 
 def resting_on_priors(found: PartMeasurement) -> list[str]:
@@ -277,3 +280,33 @@ def _stated_bounds(found: PartMeasurement) -> Table | None:
         "the recording of the calibration denies them."
     )
     return table(say("Bounds that are stated"), heads, rows, note)
+
+
+def _passed_tests(found: PartMeasurement) -> Table | None:
+    heads = (
+        say("Stated by"),
+        say("Date"),
+        say("Limit of E0"),
+        Column(say("Lengths")),
+        Column(say("Least chance to keep it")),
+        say("Reckoned with"),
+        Column(say("u without it, times"), NOTHING),
+        say("Of"),
+    )
+    names, rows = [Verbatim(one.name) for one in found.characteristics], list[tuple[Text, ...]]()
+    for one in found.standing.passed:
+        i = int(np.argmax(one.u_without)) if one.u_without else -1
+        most = (number(one.u_without[i], ".2f"), names[i]) if one.u_without else (DASH, DASH)
+        facts = Verbatim(one.facts.certificate), day(one.facts.date), mpe_words(one.facts.mpe), number(one.lengths)
+        rows.append((*facts, number(one.chance, ".2g"), say("yes") if one.used else say("no"), *most))
+    return table(
+        say("Tests of lengths that the machine passed"),
+        heads,
+        rows,
+        say(
+            "No length erred by more than its limit, whatever its error was. Where the lengths are not listed, they are "
+            "those of ISO 10360-2 through the middle of the travel. The chance is of the length that the machine, as its "
+            "recordings have it, keeps worst. u without all such tests is over u with them, of the characteristic where "
+            "that is the most."
+        ),
+    )

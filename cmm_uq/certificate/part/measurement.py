@@ -26,7 +26,7 @@ from cmm_uq.analysis.parts.ways import Way
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.origin import NAME, FurtherCertificate, attributes, further_data, rows
+from cmm_uq.certificate.origin import NAME, FurtherCertificate, PassedTest, attributes, further_data, passed_data, rows
 from cmm_uq.certificate.sections.regions import (
     evidence_data,
     families_data,
@@ -87,6 +87,7 @@ class CertificateStatus:
     changes: Mapping[str, float | None] | None = None
     further: tuple[FurtherCertificate, ...] = ()
     circular: bool = False  # whether an artefact of the calibration was certified on this very machine
+    passed: tuple[PassedTest, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -293,7 +294,7 @@ def standing_data(one: CertificateStatus) -> dict[str, Any]:
         "given_recording": one.given_recording, "drawn": _plain(one.path), "drift": _plain(one.drift),
         "changes": None if one.changes is None else rows(parameter=one.changes, change=one.changes.values()),
         "temperature_c": one.temperature_c, "inputs_sha256": dict(one.inputs_sha256),
-        **further_data(one.further),
+        **further_data(one.further), **passed_data(one.passed),
     }  # fmt: skip
 
 

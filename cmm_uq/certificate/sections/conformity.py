@@ -25,6 +25,7 @@ from cmm_uq.certificate.plots.residuals import budget_bars, trumpet
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import OUTCOME_WORDS, effect_title, interval_of, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import Quantity, figure, limit_in_full, nominal, rounded, significant
@@ -104,11 +105,12 @@ def named(statement: Statement) -> Text:
 
 def formula(facts: ConformityFacts) -> Text:
     """The maximum permissible error as the job states it; L in mm, the result in µm."""
-    mpe = facts.mpe
     if facts.limit_arcsec is not None:
         return say("{limit} ″", limit=limit_in_full(facts.limit_arcsec))
-    if mpe is None:
-        return say("{limit} µm", limit=limit_in_full(facts.limit_um or 0.0))
+    return say("{limit} µm", limit=limit_in_full(facts.limit_um or 0.0)) if facts.mpe is None else mpe_words(facts.mpe)
+
+
+def mpe_words(mpe: MaximumPermissibleError) -> Text:
     b = limit_in_full(mpe.b_um or 0.0)
     if mpe.a_um is None or mpe.k is None:
         return say("{b} µm", b=b)

@@ -326,3 +326,5 @@ def check_standing(inquiry: Inquiry, should: Mapping[str, Any], data: Mapping[st
     for i, (one, other) in enumerate(zip(more, found, strict=False)):
         for key in _OF_FURTHER:
             inquiry.compare("inputs", file, f"machine.further[{i}].{key}", problem, one[key], other[key])
+    tests, stated = ([one["stated"] for one in each.get("passed", [])] for each in (said, should))
+    inquiry.compare("inputs", file, "machine.passed", "are not the tests that the job states", tests, stated)

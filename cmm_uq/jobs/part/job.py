@@ -15,9 +15,10 @@ from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.part.checks import check_names, check_plan
+from cmm_uq.jobs.part.machine_state import MachineStateFacts
 from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
-from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
+from cmm_uq.jobs.part.tables import PartFile, Places
 from cmm_uq.jobs.part.values import Reported, reported_values
 from cmm_uq.jobs.reading import CERTIFICATES, WHOLE, further_named, in_folder
 from cmm_uq.jobs.source import RESULTS, FilesInMemory, JobFiles

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +14,9 @@ from cmm_uq.base.files.table import JobTable, Length, Limit, Position, Temperatu
 from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.jobs.part.feature import CharacteristicFacts, Count, Degrees, FeatureFacts, FormFacts, Name
+from cmm_uq.jobs.part.machine_state import MachineStateFacts
 from cmm_uq.jobs.tables.conformity import Declared, Prior, Rule, needs_prior
 from cmm_uq.jobs.tables.identification import MEASURED, Identification, Laboratory, Origin
-from cmm_uq.jobs.tables.machine import AxesFacts, FurtherList, Travel, check_carriages
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expansion, 1/K: steel has 11.5e-6.
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
@@ -47,53 +46,6 @@ class PartFacts(JobTable):
     u_cte_per_k: SmallExpansion = key(0.0, "Standard uncertainty of that coefficient, 1/K.")
     not_measured: Annotated[list[Name], Field(max_length=LISTED.most)] = []
     """What the drawing asks for besides and this job leaves out; the certificate says so."""
-
-
-class BoundFacts(JobTable):
-    """One ``[[machine_state.bound]]``: what a datasheet or certificate says that errors of the machine do not exceed."""
-
-    errors: Annotated[list[Name], Field(min_length=1)] = required("Effects that it is of.")
-    largest_um: Annotated[float, Field(gt=0, le=1000)] = required(
-        "What 95 of 100 do not exceed: the gap of play, the amplitude of a periodic error."
-    )
-    source: Name = required("Where that is stated, for the report: datasheet or certificate, with its date.")
-
-
-class MachineStateFacts(JobTable):
-    """``[machine_state]``: the machine as its certificate states it, and where its axes go."""
-
-    certificate: Name | None = None
-    """The certificate (PDF), its `results.json`, or the folder with it, inside the job's."""
-    posterior: str = ""
-    """Draws of the machine's errors (`posterior.npz`), where they do not lie beside `results.json`."""
-    job: Name | None = None
-    """In place of a certificate the folder of the machine's job, from this job's folder on; it is analysed anew."""
-    valid_until: dt.date | None = None
-    """Last day on which the certificate holds; where it is left out, the day that it names for the next calibration."""
-    travel_mm: Travel = Travel()
-    """Lowest and highest scale reading of each axis; as the certificate says where left out. A part outside is refused."""
-    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
-    """Carriages from the table to the ram, with F for the frame where the workpiece moves; as the certificate says where it is
-    left out."""
-    origin_mm: Triple = [0.0, 0.0, 0.0]
-    """Scale reading of the origin of the coordinates that `[placing]` speaks of."""
-    corrected: bool = key(True, "Whether the machine corrects the errors that its calibration found.")
-    axes: AxesFacts = key([], "How axes are read; as the certificate says where left out.")
-    bound: Annotated[list[BoundFacts], Field(max_length=LISTED.most)] = []
-    """Bounds of errors that the calibration's recording cannot show, with their sources."""
-    further: FurtherList = []
-    """Further certificates of the machine, whose recordings are taken together with that of its calibration: another
-    artefact, other lines, an earlier year."""
-
-    def problems(self) -> Iterator[str]:
-        stated = [name for one in self.bound for name in one.errors]
-        for name in sorted({name for name in stated if stated.count(name) > 1}):
-            yield f"{name} has more than one bound: state the one that holds"
-        if (self.certificate is None) == (self.job is None):
-            yield "give either certificate or job: what states the machine's errors"
-        if self.job is not None and self.posterior:
-            yield "a job is analysed anew and needs no posterior: leave it out"
-        check_carriages(self.chain)
 
 
 class StylusFacts(JobTable):

@@ -11,14 +11,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.base.errors import suggestion
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import (
     LARGEST_UM,
     RISING,
-    Divisor,
     JobTable,
     Limit,
     Positive,
@@ -31,7 +30,7 @@ from cmm_uq.base.files.table import (
 from cmm_uq.base.messages import Text
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
-from cmm_uq.jobs.tables.length_formula import FLATTEST, mpe_of
+from cmm_uq.jobs.tables.length_formula import FLATTEST, Permissible
 from cmm_uq.jobs.tables.machine import ProbeFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
 
@@ -183,30 +182,6 @@ class Circumstances:
     clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
     set_aside: Mapping[int, str] = field(default_factory=dict)
     lapsed: tuple[tuple[Text, str], ...] = ()  # what says that a calibration did not hold on the day, with its key
-
-
-class MaximumPermissibleError(JobTable):
-    """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
-
-    a_um: Uncertainty | None = key(None, "A of A + L/K.")
-    k: Divisor | None = key(None, "K of A + L/K, with L in mm and the result in µm.")
-    b_um: Limit | None = key(None, "Limit that does not grow with the length, or at which A + L/K stops growing.")
-
-    def problems(self) -> Iterator[str]:
-        if (self.a_um is None) != (self.k is None):
-            yield "mpe = A + L/K needs both a_um and k"
-        if self.a_um is None and self.b_um is None:
-            yield "give mpe = { a_um = …, k = … }, the same with b_um = …, or { b_um = … }"
-
-
-def _as_table(given: Any) -> Any:
-    """An error that is written as a formula, as the table that says the same."""
-    return mpe_of(given) if isinstance(given, str) else given
-
-
-Permissible = Annotated[
-    MaximumPermissibleError, BeforeValidator(_as_table, json_schema_input_type=MaximumPermissibleError | str)
-]
 
 
 class GuardBand(JobTable):

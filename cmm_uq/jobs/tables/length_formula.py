@@ -9,13 +9,14 @@ may be read in two ways is refused, as ``1,000`` and ``L/1.000``, which may be a
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import Field, WithJsonSchema, WrapValidator
+from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator
 
-from cmm_uq.base.files.table import LARGEST_UM, LONGEST_MM, Uncertainty
+from cmm_uq.base.files.table import LARGEST_UM, LONGEST_MM, Divisor, JobTable, Limit, Uncertainty, key
 from cmm_uq.base.points import Floats
 
 _NUMBER = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)"
@@ -70,6 +71,37 @@ def _growing(plain: str) -> dict[str, float]:
     if not slope or not k:
         raise ValueError(HOW_MPE)
     return {"a_um": first, "k": k / slope}
+
+
+class MaximumPermissibleError(JobTable):
+    """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
+
+    a_um: Uncertainty | None = key(None, "A of A + L/K.")
+    k: Divisor | None = key(None, "K of A + L/K, with L in mm and the result in µm.")
+    b_um: Limit | None = key(None, "Limit that does not grow with the length, or at which A + L/K stops growing.")
+
+    def problems(self) -> Iterator[str]:
+        if (self.a_um is None) != (self.k is None):
+            yield "mpe = A + L/K needs both a_um and k"
+        if self.a_um is None and self.b_um is None:
+            yield "give mpe = { a_um = …, k = … }, the same with b_um = …, or { b_um = … }"
+
+    def at(self, lengths_mm: Floats) -> Floats:
+        """Of some lengths (m,), µm."""
+        most = np.full(len(lengths_mm), np.inf if self.b_um is None else self.b_um)
+        if self.a_um is None or self.k is None:
+            return most
+        return np.asarray(np.minimum(self.a_um + lengths_mm / self.k, most), dtype=np.float64)
+
+
+def _as_table(given: Any) -> Any:
+    """An error that is written as a formula, as the table that says the same."""
+    return mpe_of(given) if isinstance(given, str) else given
+
+
+Permissible = Annotated[
+    MaximumPermissibleError, BeforeValidator(_as_table, json_schema_input_type=MaximumPermissibleError | str)
+]
 
 
 HOW_U = (

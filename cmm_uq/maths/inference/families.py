@@ -11,7 +11,7 @@ Geostatistics, 7.3). A family shrinks by what observations show of it alone: whe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -21,12 +21,10 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.inference.ensembles import Chains, run_ensembles
 from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reached
-from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal, cholesky
+from cmm_uq.maths.inference.marginal import cholesky
 from cmm_uq.maths.inference.noise import Components, Sizes
-from cmm_uq.maths.inference.posterior import start
-from cmm_uq.maths.inference.proposals import Fall, LogDensity, by_steps, evenly_by, laplace, weighed, weights
+from cmm_uq.maths.inference.within import WithinLimits
 
 Drawn = Callable[[np.random.Generator, int], Floats]
 
@@ -42,25 +40,7 @@ def normal(count: int) -> Drawn:
 _UNSEEN, _REACHED = (1e-4, 0.02), 1e-4
 _QUADRATIC = 1e8  # above any sum of squares that is not absurd
 _NUMBERS = 2_000_000  # in the matrices that are factorised at once
-_LEAST_WORTH = 50.0  # of weighed draws of sizes, below which a sampler draws them
-_EFFECTIVE, _STEPS = 400, 40  # sizes are few and smooth: what follows from them needs no more of them
-HELD = 250  # sizes that all draws of a part's machine have among them
-_WIDER, _SMALLEST = 1.3, 1e-4  # than the curvature says; of a family's size
 _CLASSES = 60  # of observations alike in their noise; of more, a matrix a component of the noise is less work
-
-
-@dataclass(frozen=True)
-class Effort:
-    each: int = 1000  # at once
-    most: int = 24_000
-    worth: float = 200.0  # independent draws that all are worth, with which that ends
-    held: int = HELD  # sizes that all draws have among them
-    sampler: bool = True  # whether emcee, which takes minutes, draws them where weighed ones are worth too little
-    slopes: bool = False  # whether the likeliest are looked for by slopes, and not by steps
-
-
-USUAL, BRIEF = Effort(), Effort(400, 8000, 150.0, 100, sampler=False)
-FOLD = Effort(200, 8000, 60.0, 100, sampler=False, slopes=True)  # of one of many parts of a recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +62,9 @@ class FieldModel:
     noise: Components
     estimate: LeastSquares
     errors: tuple[FieldErrors, ...]
+    # (k,) mm: of the last k observations, which no placing reaches, no more is known than that they lie so near to what is
+    # ``observed`` of them
+    limit: Floats = field(default_factory=lambda: np.zeros(0))
 
     @cached_property
     def _known(self) -> Ints:
@@ -117,6 +100,7 @@ class FieldModel:
             return np.arange(m), np.arange(0)
         least = _UNSEEN[bool(self.families)] * self.estimate.sigma_of_residuals
         moved = np.any(np.abs(self._turned[:, :-1]) > least, axis=1)
+        moved[m - len(self.limit) :] = True
         acting = moved | np.any(np.abs(self._free) > _REACHED, axis=1)
         return np.flatnonzero(acting), np.flatnonzero(~acting)
 
@@ -199,7 +183,14 @@ class FieldModel:
 
     def log_likelihood(self, sizes: Sizes, scales: Floats) -> Floats:
         """(w,) up to a constant, of sizes of the noise and of the families (w, F)."""
-        n, count = self.into.shape[1], len(scales)
+        found, within = self.recorded(sizes, scales)
+        found = found + within.log_probability
+        return np.where(np.isfinite(found), found, -np.inf)
+
+    def recorded(self, sizes: Sizes, scales: Floats) -> tuple[Floats, WithinLimits]:
+        """(w,) the same of all that was observed itself, and what then follows for that of which limits are known."""
+        n, count, k = self.into.shape[1], len(scales), len(self.limit)
+        m, mean, factors = n - k, np.empty((count, k)), np.empty((count, k, k))
         v = self.noise.variances(sizes)[0] @ self.noise.classes[1].T
         many, squares = self._alone
         found = -0.5 * (np.log(v) @ many + (1 / v) @ squares)
@@ -211,9 +202,11 @@ class FieldModel:
             whole[:, n, :n] = whole[:, :n, n] = self._seen[:, -1]
             whole[:, n, n] = _QUADRATIC
             factor = cholesky(whole)
-            diagonal, last = np.einsum("wii->wi", factor), factor[:, n, :n]  # K = L·Lᵀ; L⁻¹·n, without any difference
-            found[part] -= np.log(diagonal[:, :n]).sum(axis=1) + 0.5 * np.einsum("wi,wi->w", last, last)
-        return np.where(np.isfinite(found), found, -np.inf)
+            diagonal, last = np.einsum("wii->wi", factor), factor[:, n, :m]  # K = L·Lᵀ; L⁻¹·n, without any difference
+            found[part] -= np.log(diagonal[:, :m]).sum(axis=1) + 0.5 * np.einsum("wi,wi->w", last, last)
+            mean[part] = np.einsum("wji,wi->wj", factor[:, m:n, :m], last) - self._seen[m:, -1]
+            factors[part] = factor[:, m:n, m:n]
+        return found, WithinLimits(mean, factors @ factors.transpose(0, 2, 1), self.limit)
 
     def slopes(self, sizes: Sizes, scales: Floats) -> Floats:
         """(F,) of :meth:`log_likelihood` by squares of the families' sizes, of one draw (Rasmussen, Williams 2006, 5.9)."""
@@ -221,12 +214,13 @@ class FieldModel:
         weight = inverse @ self._seen[:, -1]
         return np.asarray(0.5 * (parts @ (np.outer(weight, weight) - inverse).ravel()))
 
-    def draw(self, sizes: Sizes, scales: Floats, random: np.random.Generator) -> Floats:
+    def draw(self, sizes: Sizes, scales: Floats, random: np.random.Generator, within: Floats | None = None) -> Floats:
         """Exact draws (N, k + …), one for each of N sizes of noise and families (N, F), of which many may be the same.
 
         Parameters, not a number where they have no prior; then of each error its coefficients, in standard deviations at the
         size one, and, where its covariance is not by its columns, n numbers w more, for which its errors at any places are
-        larger by (covariance with the p places) · ``shown(impulse)``ᵀ · w.
+        larger by (covariance with the p places) · ``shown(impulse)``ᵀ · w. ``within``: (N, k) of the observations of which
+        limits are known, how far each is from what is ``observed`` of it.
         """
         table = np.column_stack([*vars(sizes).values(), scales])
         order = np.lexsort(table.T[::-1])
@@ -234,7 +228,10 @@ class FieldModel:
         found = np.empty((len(scales), len(self.linear.unknowns) + len(self._stacked[2])))
         for rows in np.split(order, np.flatnonzero(new)[1:]):
             i = int(rows[0])
-            found[rows] = self._drawn(sizes.at(slice(i, i + 1)), scales[i], len(rows), random)
+            observed = self._seen[:, -1]
+            if within is not None:
+                observed = observed + np.pad(within[rows], ((0, 0), (len(observed) - within.shape[1], 0)))
+            found[rows] = self._drawn(sizes.at(slice(i, i + 1)), scales[i], len(rows), random, observed)
         return found
 
     @cached_property
@@ -253,13 +250,13 @@ class FieldModel:
             own += [True] * j + [False] * more
         return np.hstack(seen), np.hstack([seen[0], *gains]), np.array(sized, dtype=np.int64), np.array(own, dtype=bool)
 
-    def _drawn(self, sizes: Sizes, scale: Floats, count: int, random: np.random.Generator) -> Floats:
+    def _drawn(self, sizes: Sizes, scale: Floats, count: int, random: np.random.Generator, observed: Floats) -> Floats:
         known, noise = len(self._known), self.noise
         factor = scipy.linalg.cho_factor(self._covariance(sizes, scale[None])[0])
         variance = (noise.variances(sizes)[0] @ noise.shares.T)[0]
         # what was observed less all that could have been: parameters, errors, noise
         own = random.standard_normal((count, known))
-        left = self._seen[:, -1] - own @ self._seen[:, :known].T
+        left = observed - own @ self._seen[:, :known].T
         left -= (random.standard_normal((count, len(variance))) * np.sqrt(variance)) @ self.into
         if noise.slow.shape[1] and sizes.slow[0] > 0:
             waves = self.shown(noise.waves(sizes))
@@ -293,103 +290,3 @@ class FieldModel:
         mean = to_each @ self._seen[:, -1]
         mean[:known] += self.linear.prior_mean[self._known]
         return mean, residue @ residue.T + to_each @ noise @ to_each.T
-
-
-def size_of(latent: Floats) -> Floats:
-    """Half-normal sizes of standard normal numbers."""
-    return np.maximum(scipy.special.ndtri(0.5 * (1 + scipy.special.ndtr(latent))), _SMALLEST)
-
-
-@dataclass(frozen=True, eq=False)
-class FieldSizes:
-    """Sizes of noise and families, as often as their posterior has them."""
-
-    noise: Sizes  # (N,)
-    families: Floats  # (N, F) of those that are learned
-    worth: float  # independent draws that they are worth
-    chains: Chains | None  # of emcee, where the approximation by which they are drawn is not good enough
-
-
-def sample_sizes(
-    model: FieldModel, draws: int, seed: int, known: Sizes | None = None, effort: Effort = USUAL
-) -> FieldSizes:
-    """Posterior of the sizes of noise and families, ``draws`` of them, of which some hundred are different.
-
-    ``known``: of the noise, one draw, where it is not to be found. Raises ``CmmUqError`` where they cannot be had with the
-    effort.
-    """
-    count = len(model.families)
-    if known is not None and not count:
-        return FieldSizes(known.at(np.zeros(draws, dtype=np.int64)), np.zeros((draws, 0)), np.inf, None)
-    density, sizes, d, begin = _density(model, known)
-    begin, fall = np.append(begin, np.zeros(count)), _fall(model, density, sizes, d)
-    centre, factor = laplace(density, begin, fall if effort.slopes else None)
-    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(29,))))
-    latent, log, proposal = weighed(density, centre, _WIDER * factor, random, effort.each, effort.worth, effort.most)
-    weight = weights(log)
-    worth, chains = float(1 / np.sum(weight**2)), None
-    if worth >= _LEAST_WORTH:
-        latent = latent[evenly_by(weight, effort.held)]
-    elif not effort.sampler:
-        raise CmmUqError("how large its errors are cannot be drawn in a short time", where="the recording")
-    else:
-        chains = run_ensembles(density, proposal, seed, effective_samples=_EFFECTIVE, steps_at_once=_STEPS)
-        held = np.linspace(0, len(chains.draws) - 1, effort.held).astype(np.int64)
-        latent, worth = chains.draws[held], chains.ess_min
-    latent = latent[np.arange(draws) % len(latent)]
-    return FieldSizes(sizes(latent), size_of(latent[:, d:]), worth, chains)
-
-
-def log_evidence(model: FieldModel, seed: int, known: Sizes | None = None, effort: Effort = BRIEF) -> float:
-    """Logarithm of the probability density of the observations, all sizes integrated out by their priors.
-
-    Up to a constant that all models of a recording with the same parameters share. ``known``: as of :func:`sample_sizes`.
-    """
-    count = len(model.families)
-    density, _, _, begin = _density(model, known)
-    if not len(begin) + count:
-        return float(density(np.zeros((1, 0)))[0])
-    centre, factor = laplace(density, np.append(begin, np.zeros(count)))
-    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(41,))))
-    _, log, _ = weighed(density, centre, _WIDER * factor, random, effort.each, effort.worth, effort.most)
-    return float(np.logaddexp.reduce(log) - np.log(len(log)) - 0.5 * count * np.log(2 * np.pi))
-
-
-def _density(model: FieldModel, known: Sizes | None) -> tuple[LogDensity, Callable[[Floats], Sizes], int, Floats]:
-    """Of latent sizes (w, d + F), those of the noise first; what sizes of the noise they are, d, and where to begin (d,)."""
-    d = 0 if known is not None else model.noise.dimension
-
-    def sizes(latent: Floats) -> Sizes:
-        return model.noise.sizes(latent[:, :d]) if known is None else known.at(np.zeros(len(latent), dtype=np.int64))
-
-    def density(latent: Floats) -> Floats:
-        noise = latent[:, :d]
-        prior = -0.5 * np.sum(latent[:, d:] ** 2, axis=1)
-        if known is None:
-            low, high = np.log(max(SIGMA_BOUNDS[0], model.noise.least)), np.log(SIGMA_BOUNDS[1])
-            inside = (noise[:, 0] > low) & (noise[:, 0] < high)
-            prior = np.where(inside, prior, -np.inf)
-            noise = np.where(inside[:, None], noise, inside_of)
-            prior = prior + model.noise.log_prior(noise, model.noise.sizes(noise))
-        whole = np.hstack([noise, latent[:, d:]])
-        with np.errstate(over="ignore", invalid="ignore"):  # of sizes that no machine has
-            found = prior + model.log_likelihood(sizes(whole), size_of(latent[:, d:]))
-        return np.where(np.isfinite(found), found, -np.inf)
-
-    begin, _ = start(Marginal(model.linear, model.noise, model.estimate))
-    inside_of = begin[:d]
-    return density, sizes, d, inside_of
-
-
-def _fall(model: FieldModel, density: LogDensity, sizes: Callable[[Floats], Sizes], d: int) -> Fall:
-    """Of families by the slopes of the likelihood; of the noise, whose components come and go, by steps."""
-
-    def fall(at: Floats) -> tuple[float, Floats]:
-        value, of_noise = by_steps(density, at, d)
-        scale = size_of(at[None, d:])  # its square grows by s·φ(z)/φ(s)·dz
-        grows = (scale * np.exp(0.5 * (scale**2 - at[d:] ** 2)))[0]
-        with np.errstate(over="ignore", invalid="ignore"):  # of sizes that no machine has
-            slopes = model.slopes(sizes(at[None]), scale) * grows
-        return value, np.append(of_noise, at[d:] - np.where(np.isfinite(slopes), slopes, 0.0))
-
-    return fall

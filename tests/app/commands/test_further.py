@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,14 @@ import pytest
 
 import cmm_uq
 from cmm_uq.app.commands.certificates.further import VerifiedCertificate, _recording, refuse_adjusted
+from cmm_uq.app.commands.certificates.passed import refuse_passed
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.parts.machine import StatedMachine, refuse_machine, state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Machine
 from cmm_uq.certificate.part.measurement import FurtherCertificate
 from cmm_uq.jobs.part.job import read_part
 from tests.app.commands.test_verify_part import OTHER
@@ -124,6 +126,73 @@ def test_a_certificate_of_a_machine_that_has_moved_is_told_and_not_used(monkeypa
     (one,) = found.standing.further
     assert not one.used
     assert any("contradicts the machine" in text for text in found.warnings)
+    np.testing.assert_array_equal(found.state.draws, stated().state.draws)
+
+
+TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
+TEST = {"mpe": "30 + L/20", "certificate": "report 17", "date": dt.date(2026, 1, 2), "u_um": 0.2, "u_um_per_m": 0.5}
+
+
+def with_test(**more: Any) -> dict[str, Any]:
+    return {"machine_state": {"certificate": "machine", "passed": [{**TEST, **more}]}}
+
+
+REFUSED_TESTS = [
+    ({"certificate": "bryan-simulated"}, "whose recording is reckoned with already"),
+    ({"date": dt.date(2030, 1, 1)}, "after the part was measured"),
+    ({"readings_mm": [[0.0, 0, 0, 9999, 0, 0]]}, "X would read 9999 mm, beyond its travel"),
+]
+
+
+@pytest.mark.parametrize(("more", "words"), REFUSED_TESTS, ids=[words for _, words in REFUSED_TESTS])
+def test_a_test_that_was_passed_is_of_this_machine_and_of_no_recording_that_is_there(
+    more: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(CmmUqError) as raised:
+        refuse_machine(plate_of(by_certificate(), **with_test(**more)))
+    assert words in str(raised.value)
+    assert raised.value.fix
+
+
+def test_records_of_an_adjustment_between_test_and_calibration_refuse_it() -> None:
+    job = plate_of(by_certificate(), **with_test())
+    for day, fits in ((dt.date(2026, 1, 3), False), (dt.date(2026, 1, 2), True)):
+        refuse = partial(refuse_passed, job, Machine(travel_mm=TRAVEL), ("7", dt.date(2026, 1, 5)), (), [day])
+        if fits:
+            refuse()
+        else:
+            with pytest.raises(CmmUqError, match="was adjusted on 2026-01-03"):
+                refuse()
+
+
+@pytest.mark.long
+def test_a_test_that_was_passed_bounds_what_bars_do_not_show_and_stands_on_the_report(tmp_path: Path) -> None:
+    job = plate_of(by_certificate(), np.zeros((60, 3)), **with_test())
+    made = evaluate_part(job, PartOptions(trials=2000))
+    (one,) = made.standing.passed
+    assert (one.lengths, one.used) == (35, True)
+    assert one.chance > 1e-3
+    assert max(one.u_without) > 1.1
+    assert "play" in made.given.machine.scales
+    files = contents_of(made)
+    said = json.loads(files["results.json"])["machine"]["passed"]
+    assert {f"machine.passed[].{key}" for key in said[0]} == {key for key in PART_RESULTS if "machine.passed" in key}
+    page = files["part-simulated.html"].decode()
+    assert all(words in page for words in ("Tests of lengths that the machine passed", "report 17", "(30 + L/20) µm"))
+    assert not verify([put(tmp_path / "good", files) / "part-simulated.pdf"], rerun=False).inquiry.findings
+    forged = replace(one, facts=one.facts.model_copy(update={"certificate": "report 18"}))
+    other = contents_of(replace(made, standing=replace(made.standing, passed=(forged,))))
+    found = verify([put(tmp_path / "forged", other) / "part-simulated.pdf"], rerun=False)
+    assert {each.place for each in found.inquiry.findings} == {"machine.passed"}
+
+
+@pytest.mark.long
+def test_a_test_that_the_machine_cannot_have_passed_is_told_and_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cmm_uq.app.commands.certificates.passed.CONTRADICTED", 1.1)
+    found = state_machine(plate_of(by_certificate(), **with_test()))
+    (one,) = found.standing.passed
+    assert not one.used
+    assert any("cannot have passed the test of report 17" in text for text in found.warnings)
     np.testing.assert_array_equal(found.state.draws, stated().state.draws)
 
 

@@ -14,7 +14,7 @@ from cmm_uq.certificate.document import Paragraph, Section, Table
 from cmm_uq.certificate.part.budget_section import priors_section, resting_on_priors
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.sections.regions import families_data, priors_data
-from cmm_uq.jobs.part.tables import BoundFacts
+from cmm_uq.jobs.part.machine_state import BoundFacts
 from tests.certificate.parts_found import found_of, machine, measured_points
 from tests.jobs.part.parts import plate
 

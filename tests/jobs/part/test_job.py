@@ -11,7 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.jobs.part.checks import readings
 from cmm_uq.jobs.part.job import TABLES, files_of_the_machine
-from cmm_uq.jobs.part.tables import MachineStateFacts
+from cmm_uq.jobs.part.machine_state import MachineStateFacts
 from cmm_uq.jobs.source import FilesInMemory as InMemory
 from tests.jobs.part.parts import plate, tables
 

@@ -12,8 +12,9 @@ from scipy.stats import halfnorm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
-from cmm_uq.maths.inference import families as room
-from cmm_uq.maths.inference.families import FieldErrors, FieldModel, log_evidence, sample_sizes, size_of
+from cmm_uq.maths.inference import family_sizes as room
+from cmm_uq.maths.inference.families import FieldErrors, FieldModel
+from cmm_uq.maths.inference.family_sizes import log_evidence, sample_sizes, size_of
 from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown, solve
 from cmm_uq.maths.inference.noise import Components, Sizes
 

@@ -17,22 +17,24 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise
-from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecording, FurtherRecordings
+from cmm_uq.analysis.machine.recordings import ALONE, CONTRADICTED, FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.regions import other_errors
-from cmm_uq.analysis.machine.state import Change, MachineState, StatedNoise, changes, of_machine, with_curves
+from cmm_uq.analysis.machine.state import Change, MachineState, StatedNoise, of_machine, with_curves
+from cmm_uq.app.commands.certificates.passed import tests_passed
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import doubt_of, with_noise
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, after, day, number, say
-from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificate, FurtherCertificates
+from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificate, FurtherCertificates, PassedTest
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.machine_state import PassedFacts
 from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import FurtherFacts
 from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.stated import with_own_physics
-from cmm_uq.maths.inference.families import BRIEF
+from cmm_uq.maths.inference.family_sizes import BRIEF
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
 
 if TYPE_CHECKING:
@@ -42,8 +44,6 @@ if TYPE_CHECKING:
 # quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
 # show of errors left out. Those of all further recordings together.
 MOST, _MOST_FURTHER = 200, 150
-# chance of a recording that contradicts a machine as much, below which it is taken to be of another state of the machine
-CONTRADICTED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,17 +192,11 @@ def given_together(
         return JointRecordings()
     beside, most = ALONE, _MOST_FURTHER // len(further)
     first = FurtherRecording(model, own_noise(model, state.unmodelled, seed))
-    keys = [(effect.name, one.name) for effect in state.effects for one in effect.coefficients]
     for one in further:
         _, other = recording_of(one.job, seed, most)
         causes = causes_of(other.artefact, one.job.circumstances)
-        days = abs((one.certificate.date - state.calibrated).days) if state.calibrated else 0
-        each = [size for effect in state.effects for size in changes(effect, days, change)]
-        found = replace(
-            further_recording(first, other, state.unmodelled, seed, causes=causes),
-            change={key: size for key, size in zip(keys, each, strict=True) if size},
-            corrections=dict(zip(keys, state.corrects.tolist(), strict=True)) if one.corrected else {},
-        )
+        alone = further_recording(first, other, state.unmodelled, seed, causes=causes)
+        found, known = alone.on_its_day(state, one.certificate.date, change, corrected=one.corrected)
         chance = found.contradiction(given(beside))
         used = chance >= CONTRADICTED
         told.append(replace(one.certificate, observations=int(found.model.used.sum()), chance=chance, used=used))
@@ -218,7 +212,7 @@ def given_together(
             )
             warned.append(why)
             continue
-        if days and None in each:
+        if not known:
             unknown = say(
                 "Nothing is known of what changed on the machine between its calibration and {date}, the day of the further "
                 "certificate {number}: it is taken as unchanged, which its recording does not contradict.",
@@ -267,16 +261,34 @@ def together_of(
     return together
 
 
+@dataclass(frozen=True, eq=False)
+class GivenRecordings:
+    """A machine's state given the recordings that are at hand, and how it became so."""
+
+    state: MachineState
+    path: Text  # how its errors are drawn, in a sentence
+    given: bool = False  # whether together, by the recording of its calibration
+    further: FurtherCertificates = NO_FURTHER
+    passed: tuple[PassedTest, ...] = ()
+    without: MachineState | None = (
+        None  # the state without the tests that it passed; ``None`` where none is reckoned with
+    )
+
+
 def given_recordings(
-    state: MachineState, job: Job | None, more: Sequence[VerifiedCertificate], change: Change | None, seed: int
-) -> tuple[MachineState, Text, bool, FurtherCertificates]:
-    """The state given the recordings that are at hand; how its errors are drawn, in a sentence; what of further recordings."""
+    state: MachineState,
+    job: Job | None,
+    more: Sequence[VerifiedCertificate],
+    passed: Sequence[PassedFacts],
+    change: Change | None,
+    seed: int,
+) -> GivenRecordings:
     apart = say("errors that it did not model are each drawn on its own, which makes most uncertainties too large")
     if job is None:
-        return state, say("The recording of the calibration is not at hand: {apart}.", apart=apart), False, NO_FURTHER
+        return GivenRecordings(state, say("The recording of the calibration is not at hand: {apart}.", apart=apart))
     if not kind_of(job).by_effects:
         told = say("The calibration is of another sort than one by named errors: {apart}.", apart=apart)
-        return state, told, False, NO_FURTHER
+        return GivenRecordings(state, told)
     try:
         whole, model = recording_of(job, seed)
         estimate, count, curved = whole.estimate(), int(whole.used.sum()), with_curves(state)
@@ -284,11 +296,12 @@ def given_recordings(
         doubt = doubt_of(whole, estimate, sigma, causes_of(whole.artefact, job.circumstances))
         given = once_each(partial(given_recording, curved, model, seed=seed, doubt=doubt))
         others = given_together(curved, given, model, job, more, change, seed)
-        together = given(others.taken)
+        taken, tests, warned = tests_passed(given, model, job, others.taken, passed, change)
+        without, together = given(others.taken), given(taken)
     except CmmUqError as error:
         why = Verbatim(error.problem)
         told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
-        return state, told, False, NO_FURTHER
+        return GivenRecordings(state, told)
     text: Text = say(
         "All errors are drawn together, given the recording of the calibration, those included that it did not model."
     )
@@ -296,4 +309,6 @@ def given_recordings(
         text = after(text, say("Errors of each kind are as large as the recording shows that kind to be."))
     if (some := int(model.used.sum())) < count:
         text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
-    return together, after(text, others.told.together), True, others.told
+    further = replace(others.told, warnings=(*others.told.warnings, *warned))
+    text = after(text, others.told.together)
+    return GivenRecordings(together, text, True, further, tests, without if taken is not others.taken else None)

@@ -19,6 +19,7 @@ from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration,
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.app.commands.reading import in_language
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.origin import PassedTest
 from cmm_uq.certificate.part.measurement import standing_data
 from cmm_uq.certificate.verify.again import Again, check_results
 from cmm_uq.certificate.verify.decisions import check_part_decisions
@@ -122,7 +123,8 @@ def _check_machine(
     except CmmUqError as error:
         inquiry.wrong("dates", where, "", f"does not hold for this part: {error.problem}")
         return
-    should = standing_data(replace(standing, further=tuple(one.certificate for one in more)))
+    passed = tuple(PassedTest(one, 0, 1.0, used=True) for one in job.facts.machine_state.passed)
+    should = standing_data(replace(standing, further=tuple(one.certificate for one in more), passed=passed))
     check_standing(inquiry, should, data, file)
 
 

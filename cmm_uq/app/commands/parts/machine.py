@@ -23,6 +23,7 @@ from cmm_uq.app.commands.certificates.further import (
     refuse_adjusted,
     verify_further,
 )
+from cmm_uq.app.commands.certificates.passed import refuse_passed
 from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY, known_of, with_drift
@@ -111,6 +112,7 @@ class StatedMachine:
     job: Job | None  # of its calibration, where the inputs are at hand
     warnings: tuple[Text, ...]  # what the reader must know of it
     history: bytes | None = None  # that its changes since follow from; ``None`` where no records were asked
+    without: MachineState | None = None  # its state without the tests that it passed, where some are reckoned with
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,36 +167,48 @@ def state_machine(
         job, stated.job, verify_further(job, compute_machine_again if rerun else None, trust=trust)
     )
     known = None if since.history is None else known_of(since.history)
-    refuse_adjusted(more, known.adjusted if known else (), standing.date)
-    state, path, given, further = given_recordings(state, stated.job, more, known.change if known else None, seed)
+    adjusted = known.adjusted if known else ()
+    refuse_adjusted(more, adjusted, standing.date)
+    refuse_passed(job, machine, (standing.number, standing.date), (one.certificate.number for one in more), adjusted)
+    passed, change = job.facts.machine_state.passed, known.change if known else None
+    found = given_recordings(state, stated.job, more, passed, change, seed)
+    state, further = found.state, found.further
     circular = standing.circular or any(one.job.facts.certified_on_this_machine for one in more)
     standing = replace(
         standing,
         circular=circular,
-        path=path,
+        path=found.path,
         drift=since.told,
-        given_recording=given,
+        given_recording=found.given,
         changes=since.changes,
         further=further.each,
+        passed=found.passed,
     )
     told = [*further.warnings, *machine_warnings(job, standing, stated.job)]
     told += readings_warnings(state.statements, state.scales)
+    if passed and not found.given:
+        told.append(
+            say("Tests that the machine passed are not reckoned with: they are taken together with its recording.")
+        )
     if rerun and stated.not_again:
         told = [stated.not_again, *told]
-    return StatedMachine(state, standing, stated.job, tuple(told), since.history)
+    return StatedMachine(state, standing, stated.job, tuple(told), since.history, found.without)
 
 
 def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:
     """Refuse what :func:`state_machine` refuses of a certificate, without its errors; a job to be analysed is read alone."""
+    calibrated: Job | None
     if job.facts.machine_state.job is not None:
         calibrated = read_job(_machines_folder(job))
-        further_certificates(job, calibrated, verify_further(job))
-        fits(_machine(job, calibrated))
-        return
-    stated = _certified(job, verified(job), rerun=False)
-    _standing(job, stated, trusted=False)
-    further_certificates(job, stated.job, verify_further(job))
-    fits(_machine(job, stated.job))
+        said = calibrated.facts.job
+        named = str(said.number or said.id), said.date
+    else:
+        stated = _certified(job, verified(job), rerun=False)
+        standing, calibrated = _standing(job, stated, trusted=False), stated.job
+        named = standing.number, standing.date
+    more, machine = further_certificates(job, calibrated, verify_further(job)), _machine(job, calibrated)
+    refuse_passed(job, machine, named, (one.certificate.number for one in more))
+    fits(machine)
 
 
 def standing_of(job: PartJob, found: Verification) -> CertificateStatus:

@@ -21,10 +21,10 @@ from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.result import conforming, middle, stated, within_bounds
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual, prior_influence
-from cmm_uq.analysis.parts.ways import ways
+from cmm_uq.analysis.parts.ways import spread, ways
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
 from cmm_uq.app.commands.parts.drift import further_of
-from cmm_uq.app.commands.parts.machine import state_machine, with_calibration, with_history
+from cmm_uq.app.commands.parts.machine import StatedMachine, state_machine, with_calibration, with_history
 from cmm_uq.app.commands.reading import in_language
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
@@ -35,7 +35,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.part.figures import part_summary
-from cmm_uq.certificate.part.measurement import MATTERS, PartMeasurement, UnseenError
+from cmm_uq.certificate.part.measurement import MATTERS, CertificateStatus, PartMeasurement, UnseenError
 from cmm_uq.certificate.part.method import decided_without
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE, Behind, provenance_of
@@ -111,6 +111,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         return (twice := setup.plan_of(other)), setup.circumstances_of(other, machine.state, twice, setup.PLACES)
 
     draws = min(affordable(COMPARED, plan), trials)
+    standing = _with_without(machine, virtual, circumstances, draws, seed)
     reductions = ways(plan, circumstances, draws, seed, doubled=with_twice_the_points, planned=virtual)
     stage("What to measure on the machine", 0.8)
     unseen = tuple(  # what the calibration left free or did not see, by characteristic, the largest share first
@@ -130,7 +131,7 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
     found = PartMeasurement(
         job, plan, circumstances, virtual, simulated, characteristics, measured, shares, unseen,
         further, decisions, together, tuple(reductions),
-        point_errors(virtual, seed=seed), (x, y, z), machine.standing, compare_methods(characteristics, shares, methods),
+        point_errors(virtual, seed=seed), (x, y, z), standing, compare_methods(characteristics, shares, methods),
         digits=options.digits, seed=seed, asked=trials, warnings=(*of_part.warnings, *machine.warnings),
         files=files, influence=influence,
     )  # fmt: skip
@@ -138,6 +139,18 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         return found
     judged = tuple(one and one.not_passing for one in decisions)
     return replace(found, judged=judged, withheld=withheld, warnings=(*found.warnings, *withheld))
+
+
+def _with_without(
+    machine: StatedMachine, virtual: Virtual, given: MeasurementConditions, draws: int, seed: int
+) -> CertificateStatus:
+    """How the machine is known, with what tests that it passed do to u."""
+    if machine.without is None:
+        return machine.standing
+    without = Virtual(virtual.plan, replace(given, machine=machine.without), virtual.known)
+    ratio = tuple((spread(without, draws, seed) / spread(virtual, draws, seed)).tolist())
+    passed = (replace(one, u_without=ratio) if one.used else one for one in machine.standing.passed)
+    return replace(machine.standing, passed=tuple(passed))
 
 
 def affordable(draws: int, plan: Plan) -> int:

@@ -17,13 +17,13 @@ from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
-from cmm_uq.app.commands.certificates.further import given_recordings
+from cmm_uq.app.commands.certificates.further import GivenRecordings, given_recordings
 from cmm_uq.app.commands.parts.machine import standing_of, state_machine, verified
 from cmm_uq.app.commands.parts.part import PartOptions, affordable, decide_limits, evaluate_part
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.origin import NO_FURTHER, as_json
+from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.certificate.part.method import decided_without
 from cmm_uq.certificate.verify.decisions import check_part_decisions
@@ -101,9 +101,9 @@ def test_what_is_stated_to_be_in_doubt_at_the_calibration_is_in_the_machine_give
         job = job_of({**files, "job.toml": toml})
         own = effects(job.facts.model.effects)
         state = MachineState(job.points.machine, own, np.zeros((1, sum(len(one.coefficients) for one in own))))
-        machine, _, given, _ = given_recordings(state, job, (), None, 1)
-        assert given
-        found.append(machine.draws[:, :3].std(axis=0))
+        machine = given_recordings(state, job, (), (), None, 1)
+        assert machine.given
+        found.append(machine.state.draws[:, :3].std(axis=0))
     np.testing.assert_allclose(found[1], np.hypot(found[0], 5.75), rtol=0.03)
 
 
@@ -127,7 +127,7 @@ def test_chain_travel_and_place_are_the_certificates_where_the_job_leaves_them_o
 def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Draws of one posterior, of which a file has some in single precision: means and spreads agree to a few of a hundred."""
     unchanged = "cmm_uq.app.commands.parts.machine.given_recordings"
-    monkeypatch.setattr(unchanged, lambda state, *_: (state, say(""), False, NO_FURTHER))
+    monkeypatch.setattr(unchanged, lambda state, *_: GivenRecordings(state, say("")))
     from cmm_uq.jobs.part.job import read_part
     from tests.part_machines import plate_files
 
@@ -244,6 +244,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
         "machine.changes[]",
         "machine.families[]",
         "machine.bounds[]",
+        "machine.passed[]",
         "machine.axes[]",
         "machine.further[]",
         "other_methods.",
