@@ -28,18 +28,19 @@ from cmm_uq.jobs.importing.format import (
     sources_of,
     unit_named,
 )
-from cmm_uq.jobs.importing.header import WORD, named_alike, plain_words, words_of
-from cmm_uq.jobs.importing.lengths.places import END, START, role_among, said_in, without_place
+from cmm_uq.jobs.importing.header import WORD, named_alike, plain_words, without_unit, words_of
+from cmm_uq.jobs.importing.lengths.places import END, START, role_among, said_in, says_figures, without_place
 
 _RULE = re.compile(r"[-=_*+|.\s]*")
 DATED = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}|\d:\d\d|年")
-_PRINTED = re.compile(r"\d[.,]\d")
-_FORMULA = re.compile(r"(?<=\S)\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
+_PRINTED, _BRACKETS = re.compile(r"\d[.,]\d"), re.compile(r"\([^)]*\)")
+_FORMULA = re.compile(r"(?<=\S)(?<![XYZxyz])\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 DEEPEST = 4  # rows of a head
 _TITLES = 3  # between a head and its figures, at most
 _AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012]?(?![^\W_]))", re.IGNORECASE)
 _ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?0(?!\w)")
+_SEVERAL = 3  # places in a row, more than a line has
 _MEASURED = 0.05  # figures printed finer are no planned places
 
 
@@ -113,7 +114,9 @@ class CutSheet:
 
     def _of_another(self, row: int, k: int) -> bool:
         text = self.text(row, k)
-        unit = unit_named(text) if self.figures[row][k] is None else (apart(text) or ("", None))[1]
+        bare = self.figures[row][k] is None
+        unit = unit_named(text) if bare else (apart(text) or ("", None))[1]
+        unit = without_unit(text)[1] if bare and unit is None and "°" in text else unit
         return unit is not None and unit.sort != LENGTH
 
     def unit_beside(self, rows: Sequence[int]) -> WrittenUnit | None:
@@ -171,7 +174,7 @@ class CutSheet:
             return "text"  # as Position;1 above a block, or Position 1 | 90 deg
         if self._is_head(i) and i + 1 < len(self.sheet.rows):
             units = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i + 1] if cell != ""]
-            below = i + 1 + (len(units) == 1 and i + 2 < len(self.sheet.rows))  # below a title
+            below = next((j for j in range(i + 1, min(len(self.figures), i + DEEPEST)) if any(self.figures[j])), i + 1)
             if any((self.figure(below, k) or (0, 1))[1] < 1 for k in numbers) or (
                 units and all(map(unit_named, units))
             ):
@@ -324,12 +327,16 @@ class CutSheet:
             between = range(self.sheet.lines[row] + 1, self.sheet.lines[head[0]] if head else 0)
             texts = [self.text(row, k) for k in filled]
             odd = any(
-                len(text) > 60 or (len(filled) < 4 and "=" in text) or len(_PRINTED.findall(text)) > 1 for text in texts
+                len(text) > 60
+                or (len(filled) < 4 and "=" in text)
+                or len(_PRINTED.findall(_BRACKETS.sub("", text))) > 1
+                for text in texts
             )
             odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3
-            if len(head) == DEEPEST or odd or not self._ruled.issuperset(between) or self.place(row):
-                break
             over = [k for k in filled if k in numbers]
+            placed = self.place(row) and sum(map(says_figures, texts)) < _SEVERAL  # else above each column
+            if len(head) == DEEPEST or odd or not self._ruled.issuperset(between) or placed:
+                break
             apart = not head and (len(filled) < 2 or not over) and filled != over
             # the last of them stands over all that follow
             first = head and 0 in numbers and not self.text(head[0], 0) and unit_of(texts[:1])  # named there alone
@@ -361,4 +368,4 @@ def _counts_pages(text: str) -> bool:
 
 def _begun(word: str) -> str:
     """How a title begins; all letters of axes alike."""
-    return word.casefold() if len(word) > 1 or not word.isascii() else "x"
+    return "x" if len(word) == 1 and word.isascii() else re.sub(r"^[xyz](?=[^\x00-\x7f])", "x", word.casefold())

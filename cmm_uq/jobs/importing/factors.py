@@ -22,8 +22,18 @@ from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
 LINE, RUN, POINT = "line", "run", "point"
 _MARKS = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
+# first letters of words for both senses, forward first: in English, German, French and Italian, Spanish
+_PAIRS = (
+    {"F": 1, "B": -1},
+    {"F": 1, "R": -1},
+    {"V": 1, "R": -1},
+    {"H": 1, "R": -1},
+    {"A": 1, "R": -1},
+    {"I": 1, "V": -1},
+)
 _TOKEN = re.compile(r"[^\W_]+")
 _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
+_SHORTENED = re.compile(r"[^\W\d_]{3,}(?=\.)")
 _DATED = 8  # digits of a date
 _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
 LETTERS = {*"ABCDEFGHabcdefgh"}  # of balls
@@ -46,6 +56,9 @@ Counted = tuple[Label, Ints, str | None]  # a label, the number of its value for
 
 def ways_of(values: Sequence[str]) -> list[int] | None:
     """Sense of travel that labels name, +1 or −1; ``None`` where one of them names none, or all the same."""
+    letters = {value: re.sub(r"[\d\W]", "", value).upper() for value in {*values}}
+    if (pair := next((own for own in _PAIRS if {*own} == {*letters.values()}), None)) is not None:
+        return [pair[letters[value]] for value in values]
     known = {value: way_of(value) for value in {*values}}
     first, *others = known.values()
     if len(others) == 1 and not first * others[0]:  # of two the one says the other
@@ -56,13 +69,16 @@ def ways_of(values: Sequence[str]) -> list[int] | None:
 @lru_cache(maxsize=4096)
 def way_of(value: str) -> int:
     """Sense of travel that a label names; 0 where it names none."""
-    text, words = value.strip(" ()[]"), plain_words(value)
+    text = value.strip(" ()[]").replace("->", "→").replace("<-", "←")
+    words, short = plain_words(text), plain_words(" ".join(_SHORTENED.findall(text)))
     own = {_MARKS[c] for c in text if c in "↑↓→←"}
     ends = (text[-1:], text[:1] if not text[1:2].isdigit() else "")
     own |= set() if own else {_MARKS[c] for c in ends if c in _MARKS}
     for name, sense in (("forward", 1), ("backward", -1)):
         asian = [one for one in words_of("ways")[name] if len(one) > 1 and unspaced(one)]
-        if any(word in words_of("ways")[name] or any(one in word for one in asian) for word in words):
+        known = words_of("ways")[name]
+        begun = any(one.startswith(word) for word in short for one in known)
+        if begun or any(word in known or any(one in word for one in asian) for word in words):
             own.add(sense)
     return own.pop() if len(own) == 1 else 0
 
@@ -214,6 +230,7 @@ def varying(labels: Sequence[Label], *, lengths: bool) -> list[Counted]:
             if (
                 before is None
                 or (before[2] is None and of is not None)
+                or (label.sort == "head" and of == LINE and counting(before[0].values))
                 or (before[2] == POINT and label.sort == "column" and hint(label.words, lengths=lengths) == LINE)
             ):
                 seen[own.tobytes()] = label, own, of

@@ -31,7 +31,7 @@ def plain_words(text: str) -> list[str]:
     plain = text.casefold()
     if not plain.isascii():
         plain = unicodedata.normalize("NFKD", plain.translate(_ORDINAL))
-        plain = "".join(c for c in plain if not unicodedata.combining(c))
+        plain = unicodedata.normalize("NFC", "".join(c for c in plain if not unicodedata.combining(c)))
     return _WORDS.findall(plain)
 
 
@@ -68,7 +68,8 @@ def words_of(table: str) -> Mapping[str, frozenset[str]]:
     return {name: frozenset(" ".join(plain_words(one)) for one in of) for name, of in printed_words(table).items()}
 
 
-_WORDS = re.compile(r"[^\W\d_\u3040-\u9fff]+|[\u3040-\u9fff]+|\d+")  # Japanese beside a letter is a word of its own
+# Japanese and Korean beside a letter is a word of its own
+_WORDS = re.compile(r"[^\W\d_\u3040-\u9fff\uac00-\ud7a3]+|[\u3040-\u9fff\uac00-\ud7a3]+|\d+")
 _ORDINAL = str.maketrans("łøđı", "lodi", "ªº°")  # letters that are none with an accent; signs after a number
 _COLUMNS = {phrase: column for column, phrases in words_of("columns").items() for phrase in phrases}
 _AXIS = words_of("axis")  # words beside the letter of an axis, those that leave it a coordinate among them

@@ -288,7 +288,9 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     target = units.converted(figures[:, 0], unit, "x_mm")
     deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um")
     named = [
-        [find(f"{label.words} {value}") for value in label.values] for find in (axis_in, _letter_in) for label in labels
+        [find(value) or find(f"{label.words} {value}") for value in label.values]
+        for find in (axis_in, _letter_in)
+        for label in labels
     ]
     axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
     ways = senses(labels, target.tolist())

@@ -321,12 +321,12 @@ def _with_unit(sheet: Sheet) -> Sheet:
     """With the unit that a line ahead of its table says, as ``Units: mm``."""
     rows = sheet.rows[:LINES_BEFORE] if sheet.unit is None and not sheet.listed else ()
     for row, below in zip_longest(rows, rows[1:], fillvalue=()):  # which may stand below its word
-        if sum(cell != "" and is_number(cell) for cell in row) > 1:
-            break
         text = ";".join(map(str, row))
         match = _UNIT_LINE.search(f"{text} {below[0]}" if len(row) == len(below) == 1 and text[-1:] == ":" else text)
         if match and (unit := length_named(match[1].strip("[]().,;"))) and unit.name not in SMALL:
             return replace(sheet, unit=unit.name)
+        if sum(cell != "" and is_number(cell) for cell in row) > 1:
+            break
     return sheet
 
 

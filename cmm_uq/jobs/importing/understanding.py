@@ -30,7 +30,7 @@ from cmm_uq.jobs.importing.grouping import places
 from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary
 from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
-from cmm_uq.jobs.importing.lengths.line_labels import lines_and_runs
+from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
 from cmm_uq.jobs.importing.lengths.places import place_of_axis, says_figures, stated_places
 from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
@@ -145,7 +145,8 @@ def _label(chosen: Sequence[Found]) -> None:
     for reading, grid in chosen:
         for labels, row in zip(reading.labels, reading.rows, strict=True):
             labels["sheet", ""] = grid.sheet.name
-            labels["place", ""] = "\n".join((grid.sheet.name, *grid.says(row)))
+            heads = (text for (sort, _), text in labels.items() if sort == "head")
+            labels["place", ""] = "\n".join((grid.sheet.name, *grid.says(row), *heads))
 
 
 def _chosen(found: Sequence[Found]) -> list[Found]:
@@ -332,7 +333,7 @@ class Understanding:
     def lengths(self, keys: ImportKeys, where: str, reach_mm: float | None) -> MeasuredLengths:
         unit, of_unit = self.unit(keys, where, reach_mm)
         own, figures, place = self.reading, np.array(self.reading.figures), self.grid.at(self.header.row)
-        lengths = codes([None if np.isnan(one) else one for one in figures[:, 0]])
+        lengths = lengths_of(figures[:, 0])
         lines, runs, used = lines_and_runs(own.every_label, lengths, place)
         reference, measured = (formats.converted(one, unit, "length_mm") for one in figures.T)
         if own.deviations:

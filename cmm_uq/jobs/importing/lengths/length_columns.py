@@ -6,13 +6,15 @@ or the worst or the mean of several; what is a mean, a range or a limit is no ru
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
-from cmm_uq.jobs.importing.cells.figures import unit_of
+from cmm_uq.jobs.importing.cells.figures import figure, unit_of
 from cmm_uq.jobs.importing.factors import hint, numberless
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, WrittenUnit
 from cmm_uq.jobs.importing.lengths.evidence import (
@@ -30,6 +32,7 @@ BASES = ("reference", "nominal", "target")
 _FAR = 1.0  # mm by which no measured length differs from its reference, where both are called so
 _LEAST = 2.0  # of a length without a reference, in the unit of the file
 WIDEST = 100  # columns of a table of lengths
+_WITHIN = re.compile(r"(?<![\d.,])\d+[.,]\d+(?![\d.,]*\d)")  # figures in texts
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
 _NAME = "Name the columns by what they are: nominal_mm, reference_mm, length_mm, deviation_um"
@@ -159,9 +162,12 @@ def _lengths(
         checked, factor = _checked(grid, rows, small, source, base)
     if not deviations:
         checked += sum(c.sums_up(source, worst=True) for c in columns if c.role == "summary")
-        of_all = [steady(source[0], c) for c in small] if base is None and len(source) == 1 else []
+        whole = source if len(source) == 1 else [c for c in group if c not in source and c.sums_up(source)]
+        of_all = [steady(m, c) for m in whole for c in columns if c in small or c.minute] if base is None else []
         checked += sum(map(bool, of_all))
-        base = base or _reference_in_head(grid, rows, source) or next(filter(None, of_all), None)
+        mean = np.mean([c.values for c in source])  # of which no calibration is known
+        known = (one for one in of_all if one is not None and abs(one.values[0] - mean) > 1.05 * one.step)
+        base = base or _reference_in_head(grid, rows, source) or next(known, None)
     named = {c.unit.name for c in source if c.unit} if deviations else set()
     source = source if side_by_side(source) else counted_heads(source)
     if not source or len(named) > 1 or not _plain(columns, group, base, source, checked):
@@ -210,12 +216,22 @@ def _plain(
 
 
 def side_by_side(columns: Sequence[FigureColumn]) -> bool:
-    """Whether columns are runs or lines side by side: their heads are alike but for numbers, or all name a line or a run."""
-    for texts in zip(*(c.path for c in columns), strict=True):
-        counted = len({*map(numberless, texts)}) == 1
-        if not counted and any(hint(text, lengths=True) not in ("line", "run") for text in texts):
-            return False
-    return True
+    """Whether columns are runs or lines side by side: their heads are alike but for numbers, or name lines or runs.
+
+    What else stands in a head must be the same for each of those.
+    """
+    levels = [*zip(*(c.path for c in columns), strict=True)]
+    counting = [len({*map(numberless, texts)}) == 1 and _from_one(texts) for texts in levels]
+    called = [all(hint(text, lengths=True) in ("line", "run") for text in texts) for texts in levels]
+    known = [own for own, *known in zip(levels, counting, called, strict=True) if any(known)]
+    each = [*zip(*known, strict=True)] if known else [()] * len(columns)
+    return all(len({*zip(each, own, strict=True)}) == len({*each}) for own in levels) and (bool(known) or not levels)
+
+
+def _from_one(texts: Sequence[str]) -> bool:
+    """Whether texts are no bare numbers, or such from 1 on: others number all columns of a table."""
+    numbers = {int(text) for text in texts if text.isdecimal()}
+    return numbers <= {*range(1, len(numbers) + 1)}
 
 
 def counted_heads(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
@@ -236,7 +252,7 @@ def _deviations(
         what = f"{', '.join(repr(c.heading) for c in runs[:3])} may be lengths, or deviations in µm or mm"
         fix = said_by("deviation_um", runs, ", deviation_mm or length_mm")
         raise NotReadError(what, where=grid.at(rows[0]), fix=fix)
-    source = source or (counted_heads(parted) if base.role else [])
+    source = source or ((parted if side_by_side(parted) else counted_heads(parted)) if base.role else [])
     source = without_derived(source) or source
     once = len(np.unique(base.values)) == len(base.values)
     return [] if once and len(source) == 1 and len(free) < len(small) and base.round else source  # as certificates are
@@ -275,8 +291,10 @@ def _reference_in_head(grid: CutSheet, rows: Sequence[int], measured: Sequence[F
     """The one calibrated length of a bar, where the rows above its measured lengths say it."""
     found = {}
     for row in range(min(rows)):
-        for k, own in enumerate(grid.figures[row]):
-            before = next((grid.text(row, j) for j in range(k - 1, -1, -1) if grid.text(row, j)), "")
+        cells = [(grid.text(row, k), own) for k, own in enumerate(grid.figures[row]) if grid.text(row, k)]
+        within = [(text[: m.start()], figure(m[0], grid.sign)) for text, _ in cells for m in _WITHIN.finditer(text)]
+        beside = [(before, own) for (before, _), (_, own) in pairwise(cells)]
+        for before, own in (*beside, *within):
             if own is not None and own[1] < 1 and said([before]) == "reference":
                 values = np.full(len(rows), own[0])
                 if all(like(values, c.values) for c in measured):

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from cmm_uq.base.points import Ints
+import numpy as np
+
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.factors import (
     LINE,
     POINT,
     RUN,
     Counted,
     Label,
+    codes,
     counted,
     counting,
     fixes,
@@ -23,12 +26,34 @@ from cmm_uq.jobs.importing.factors import (
 )
 from cmm_uq.jobs.importing.format import NotReadError
 
+_FEW = 4  # references that may differ by chance
+
+
+def lengths_of(references: Floats) -> Ints:
+    """A number for each length; of references that were measured anew each time those near each other are of one."""
+    own = codes([None if np.isnan(one) else one for one in references])
+    if len(own) < _FEW or own.max() + 1 < len(own):
+        return own
+    order = np.argsort(references)
+    steps = np.diff(references[order]) > np.maximum(0.04, 0.002 * np.abs(references[order][1:]))
+    near = np.empty(len(own), dtype=np.int64)
+    near[order] = np.concatenate([[0], np.cumsum(steps)])
+    return near
+
 
 def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
     """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
     count, several, found = len(reference), bool(reference.max(initial=0) > 0), varying(labels, lengths=True)
     if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
         found = [(f[0], f[1], RUN if f[0].sort == "head" and counting(f[0].values) else f[2]) for f in found]
+    above = [f for f in found if f[0].sort in ("title", "sheet") and f[2] == LINE and not fixes(f[1], reference)]
+    # numbers of the lengths of each line, though they are called positions
+    found = [
+        (f[0], f[1], POINT)
+        if f[0].sort == "column" and f[2] == LINE and any(fixes(together(one[1], f[1]), reference) for one in above)
+        else f
+        for f in found
+    ]
     plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
     run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
     line: list[Counted] = []

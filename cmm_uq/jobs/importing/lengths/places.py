@@ -112,11 +112,12 @@ def without_place(text: str, sign: str) -> str:
 
 def said_in(texts: Iterable[str], sign: str = ".") -> Said:
     """What texts say of the place of one line."""
-    said = Said()
-    for text in dict.fromkeys(texts):
+    said, texts = Said(), [*dict.fromkeys(texts)]
+    planes = set[str]().union(*map(_planes, texts))
+    for text in texts:
         plain = unicodedata.normalize("NFKC", text).replace("−", "-")
         last, before = 0, False
-        for start, end, values, to in _figures(plain, sign):
+        for start, end, values, to in _figures(plain, sign, planes):
             gap, place = plain[last:start], to is None or len(values) == 3
             role = role_of(re.split(r"\d", gap)[-1], after=before) or (END if before and _ARROW.search(gap) else "")
             if role == DIRECTION and len(values) == 3 and max(map(abs, values.values())) <= _VECTOR:
@@ -136,10 +137,14 @@ def said_in(texts: Iterable[str], sign: str = ".") -> Said:
     return said
 
 
-def _figures(text: str, sign: str) -> list[Coordinates]:
+def _planes(text: str) -> set[str]:
+    return {"".join(sorted(letters)) for _, letters in _AXIS.findall(text) if len(letters) == 2}
+
+
+def _figures(text: str, sign: str, planes: Collection[str] = ()) -> list[Coordinates]:
     """Coordinates in a text: three in brackets, behind the letters of all axes or behind a word; each behind its letter."""
     found: list[Coordinates] = []
-    planes = {"".join(sorted(letters)) for _, letters in _AXIS.findall(text) if len(letters) == 2}
+    planes = planes or _planes(text)
     for match in _BRACKET.finditer(text):
         if (three := _three(match[1], sign)) is not None:
             found.append((match.start(), match.end(), dict(zip("XYZ", three, strict=True)), None))
@@ -149,12 +154,11 @@ def _figures(text: str, sign: str) -> list[Coordinates]:
             found.append((match.start(), match.end(), own, None))
     for match in _BARE.finditer(text):
         ahead = text[max((b for _, b, *_ in found if b <= match.start()), default=0) : match.start()]
-        near = (
-            role_of(ahead)
-            and len(re.sub(r"^.*[^\W\d_]", "", ahead)) < _NEAR_WORD
-            and not re.search(r"\b[a-z]\W*$", ahead, re.I)
-        )
+        role = role_of(ahead) if len(re.sub(r"^.*[^\W\d_]", "", ahead)) < _NEAR_WORD else ""
+        near = role and not re.search(r"\b[a-z]\W*$", ahead, re.I)
         three = _three(match[0], sign) if near or _ALL_AXES.search(ahead) else None
+        if three and role == DIRECTION and max(map(abs, three)) > _VECTOR:
+            continue
         if three is not None and not any(a < match.end() and match.start() < b for a, b, *_ in found):
             found.append((match.start(), match.end(), dict(zip("XYZ", three, strict=True)), None))
     return sorted([*found, *_lettered(text, sign, found)], key=lambda one: one[0])

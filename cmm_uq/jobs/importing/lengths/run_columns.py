@@ -17,6 +17,7 @@ from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, settled_base
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like
 
 _MOST_OF_A_TURN, _DEGREES = 300, re.compile(r"°|\bdeg", re.IGNORECASE)
+_FEWEST = 3  # targets of an axis
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 
 
@@ -27,6 +28,8 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
     if target is None or not np.isfinite(target.values[0]):
         return None
     values = target.downwards
+    if len(np.unique(values)) < _FEWEST:
+        return None  # or figures of a title
     filled = replace(target, values=values)
     beside = [c for c in columns if c is not target and c.role in (None, "deviation", "measured")]
     ways = _ways(beside)
