@@ -84,6 +84,9 @@ def skewed_note(quantities: Iterable[Quantity]) -> tuple[Text, ...]:
 CERTAIN = 1e-4  # A probability nearer to 0 or 1 than this is printed as less or more than it
 
 
+TOO_UNCERTAIN = say("Not decided: the uncertainty is too large for any value to be accepted")
+
+
 def probability(p: float) -> Text:
     """A probability in per cent that never claims certainty."""
     if p < CERTAIN:

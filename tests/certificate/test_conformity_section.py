@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.standards import statement
-from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.statement import NOT_DETERMINED, Statement
 from cmm_uq.app.commands.report import outcome_of
-from cmm_uq.base.messages import say
+from cmm_uq.base.messages import Text, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import DecisionBlock, Document, Plot, Table
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.sections.conformity import budget_table, conformity_section, decision_block, formula
+from cmm_uq.certificate.sections.results import overview_of
 from cmm_uq.jobs.reports import AsFound
 from cmm_uq.jobs.tables.conformity import ConformityFacts, Prior
 from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
+from cmm_uq.jobs.verdicts import Verdict, Verdicts
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
@@ -45,6 +47,49 @@ def blocks(found: Statement) -> tuple[DecisionBlock, Plot, Table]:
     assert isinstance(plot, Plot)
     assert isinstance(table, Table)
     return decision, plot, table
+
+
+@dataclass
+class Stated:
+    """Statements by themselves."""
+
+    statements: tuple[Statement, ...]
+    verdicts: Verdicts
+
+
+def first_page(*verdicts: Verdict, statements: tuple[Statement, ...] = ()) -> tuple[str, list[str]]:
+    overview = overview_of(Stated(statements, Verdicts(verdicts)))
+    assert overview is not None
+    return str(overview.verdict), [str(text) for _, text in overview.rows]
+
+
+@pytest.mark.parametrize(("missing", "row"), [
+    ((NOT_DETERMINED,), "undecided: not determined by this recording"),
+    ((say("the length has no uncertainty"), say("a certificate from another machine")),
+     "undecided: the length has no uncertainty; a certificate from another machine"),
+])  # fmt: skip
+def test_what_stands_in_the_way_of_a_tolerance_is_said_and_nothing_else(missing: tuple[Text, ...], row: str) -> None:
+    """Of 79 ± 40 ppm within 150 the first page said that it was not determined, and nearer to its limit than that."""
+    one = Verdict("scale_x.ppm", "undecided", None, None, 150.0, unit("ppm"), missing=missing)
+    verdict, rows = first_page(one)
+    assert verdict == "Not decided"
+    assert rows[0] == row
+    near = replace(one, value=120.0, U=40.0, missing=())
+    assert first_page(near)[0] == "Not decided: the value is nearer to its limit than its uncertainty"
+    assert first_page(near, one)[0].startswith(
+        "Not decided: the value is nearer to its limit than its uncertainty: 2 of 2"
+    )
+
+
+def test_an_uncertainty_that_leaves_no_value_to_accept_is_said_so() -> None:
+    """0.5 of 4 ± 4 µm lies far from its limit."""
+    found = stated(u_um=40.0, rule="ASME B89.7.3.1")
+    assert found.outcome == "undecided"
+    verdict = Verdict("E0", found.outcome, found.value_um, 80.0, 4.0, unit("µm"), found.facts.standard)
+    assert (
+        first_page(verdict, statements=(found,))[0]
+        == "Not decided: the uncertainty is too large for any value to be accepted"
+    )
 
 
 @pytest.mark.parametrize(("wish", "words"), [

@@ -157,7 +157,7 @@ def by_tolerance(
 
     ``against``: what speaks against a pass, whatever the interval; ``determined``: whether the recording determines it.
     """
-    missing = tuple(against) if determined else (say("the recording does not determine it"),)
+    missing = tuple(against) if determined else (NOT_DETERMINED,)
     if not determined or (missing and by_tolerance(name, title, quantity, tolerance).outcome == "pass"):
         return Verdict(name, "undecided", None, None, tolerance, quantity.unit, title=title, missing=missing)
     low, high = quantity.interval95
@@ -166,6 +166,7 @@ def by_tolerance(
     return Verdict(name, outcome, quantity.value, quantity.expanded, tolerance, quantity.unit, title=title)
 
 
+NOT_DETERMINED = say("the recording does not determine it")
 NOT_CONVERGED = say("the sampling did not converge")
 OUTSIDE = ("fail", "conditional fail")  # outcomes of a value that lies outside
 # Outcomes of one outside the zone of conformance: further readings stand for it, too, where they were made, or a larger

@@ -23,7 +23,7 @@ from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, fig
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
 from cmm_uq.certificate.part.plots import Margin, correlation_section, margin_plots
-from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
+from cmm_uq.certificate.wording import OUTCOME_WORDS, TOO_UNCERTAIN, probability
 from cmm_uq.jobs.tables.conformity import needs_prior
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.jobs.verdicts import standing_of
@@ -43,18 +43,30 @@ def overview_of(found: PartMeasurement) -> doc.Overview:
         (say("Not covered"), _not_covered(found)),
     )
     return doc.Overview(
-        verdict_words(found.outcomes, found.outcome, measured=found.measured is not None, withheld=found.withheld),
+        verdict_words(
+            found.outcomes,
+            found.outcome,
+            measured=found.measured is not None,
+            withheld=found.withheld,
+            none_accepted=any(one and one.accepted is None for one in found.judged),
+        ),
         "unknown" if found.outcome is None else standing_of(found.outcome),
         facts.rows,
     )
 
 
 def verdict_words(
-    outcomes: Sequence[Outcome], outcome: str | None, *, measured: bool, withheld: Sequence[Text] = ()
+    outcomes: Sequence[Outcome],
+    outcome: str | None,
+    *,
+    measured: bool,
+    withheld: Sequence[Text] = (),
+    none_accepted: bool = False,
 ) -> Text:
     """Whether the part conforms.
 
-    ``outcomes``: of its characteristics; ``outcome``: of the whole. ``measured``: whether anything was.
+    ``outcomes``: of its characteristics; ``outcome``: of the whole. ``measured``: whether anything was. ``none_accepted``:
+    whether the uncertainty of one leaves no value to be accepted.
     """
     if not outcomes:
         planned = say("Uncertainty of a planned measurement: nothing was measured")
@@ -76,6 +88,8 @@ def verdict_words(
         return say("Incomplete: not all of the drawing was measured")
     if withheld:
         return withheld[0]
+    if none_accepted:
+        return TOO_UNCERTAIN
     open_ = sum(one == "undecided" for one in outcomes)
     return plural(
         open_,

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.analysis.conformity.decision import rule_words
 from cmm_uq.analysis.conformity.own_rule import titled
-from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.statement import NOT_DETERMINED, Statement
 from cmm_uq.base import messages
 from cmm_uq.base.messages import (
     NOTHING,
@@ -257,11 +257,11 @@ _ROWS = {True: 26, False: 16}  # of a table that the first page has room for, wi
 
 _WORDS: Mapping[str, Text] = {
     "fail": say("Does not conform"),
-    "conditional fail": say("Does not conform, within the uncertainty of the measurement"),
+    "conditional fail": say("Conditionally rejected: beyond its limits, not with its uncertainty"),
     "remeasure": say("Not decided: the standard asks for further readings"),
     "undecided": say("Not decided: the value is nearer to its limit than its uncertainty"),
     "incomplete": say("Incomplete: conformity is not stated"),
-    "conditional pass": say("Conforms, within the uncertainty of the measurement"),
+    "conditional pass": say("Conditionally accepted: within its limits, not with its uncertainty"),
 }
 
 
@@ -286,19 +286,24 @@ def overview_of(result: Stating) -> doc.Overview | None:
     if len(verdicts) > len(result.statements):
         rules.append(say("tolerances: the whole 95 % interval must lie within"))
     rows.append((say("Decision rule"), semicolons(dict.fromkeys(rules))))
-    return doc.Overview(_verdict(verdicts), standing_of(verdicts.overall), tuple(rows))
+    return doc.Overview(_verdict(verdicts, result.statements), standing_of(verdicts.overall), tuple(rows))
 
 
 def _gravity(outcome: str) -> int:
     return GRAVEST.index(outcome) if outcome in GRAVEST else GRAVEST.index("undecided")
 
 
-def _verdict(verdicts: Sequence[Verdict]) -> Text:
+def _verdict(verdicts: Sequence[Verdict], statements: Sequence[Statement]) -> Text:
     overall, count = gravest(one.outcome for one in verdicts), len(verdicts)
     if overall == "pass":
         many = say("Conforms: all {count} statements of conformity", count=count)
         return plural(count, one=say("Conforms"), many=many)
     words, alike = _WORDS.get(overall, say("Not decided")), sum(one.outcome == overall for one in verdicts)
+    undecided = [one.decision for one in statements if one.outcome == "undecided"]
+    if overall == "undecided" and any(one.guard_band is None for one in undecided):
+        words = wording.TOO_UNCERTAIN
+    elif overall == "undecided" and all(one.value is None for one in verdicts if one.outcome == overall):
+        words = say("Not decided")
     several = say("{words}: {alike} of {count} statements of conformity", words=words, alike=alike, count=count)
     return words if count == 1 else several
 
@@ -306,6 +311,8 @@ def _verdict(verdicts: Sequence[Verdict]) -> Text:
 def _row(one: Verdict, *, signed: bool) -> Text:
     if one.value is None:
         outcome = wording.OUTCOME_WORDS.get(one.outcome, say("undecided"))
+        if one.missing and NOT_DETERMINED not in one.missing:
+            return say("{outcome}: {why}", outcome=outcome, why=semicolons(one.missing))
         return say("{outcome}: not determined by this recording", outcome=outcome)
     value = wording.stated_value(one.value, one.U, signed=signed)
     return wording.stated_row(one.outcome, value, one.unit, one.limit if one.by else None)

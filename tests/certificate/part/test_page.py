@@ -258,6 +258,13 @@ def test_the_verdict_is_that_of_all_decisions(
     assert overview.standing == standing
 
 
+def test_a_part_whose_uncertainty_leaves_no_value_to_accept_is_near_to_no_limit(measured: PartMeasurement) -> None:
+    first, *others = measured.judged
+    assert first is not None
+    overview = overview_of(replace(measured, judged=(replace(first, outcome="undecided", accepted=None), *others)))
+    assert overview.verdict == "Not decided: the uncertainty is too large for any value to be accepted"
+
+
 def test_the_least_margin_is_told_first(measured: PartMeasurement) -> None:
     told = row_of(measured, "Least margin")
     place = measured.nearest
