@@ -14,6 +14,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import SMALL, figure
 from cmm_uq.jobs.importing.factors import hint
@@ -26,12 +27,16 @@ _OFF_MM = 1.0  # farther from its target no axis comes to rest
 _SAME = 2.0  # between what is nominal and what is measured; or a part of 0.002
 _EXACT = ("nominal", "reference", "target")
 _WIDE = 4.0  # of deviations and tolerances, in the unit of the file
+_PROBED = 8  # places on a circle
 _FEW = 3  # places, which may be round by chance
 _UNIT_VECTOR = 2e-3  # to which directions have the length 1
 _LETTER = re.compile(r"(?<![A-Za-zÀ-ɏ])([xyzXYZ])(?![A-Za-zÀ-ɏ])")
 _EQUAL = re.compile(r"\s*[=:]\s*[-+]?\d")
 _LEVEL = re.compile(r"(?<![^\W\d_])([XYZ])\s*[=:]\s*([-+]?\d+(?:[.,]\d+)?)(?![^\s;)])")
 _COUNTED = re.compile(r"\d+|(?<![^\W\d_])[A-Za-z](?![^\W\d_])")
+
+
+OF_CIRCLES = "Give x_mm, y_mm and z_mm, from radius and angle (docs/reference/columns.md, circular_test)"
 
 
 class EitherError(NotReadError):
@@ -103,7 +108,7 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     columns = columns_in(grid, blocks, rows) if rows else []
     lengths = [c for c in columns if c.may_be_length]
     named = _named(lengths, _levels(grid))
-    triples, checked = _measured(named or _bare(lengths), grid.at(min(rows, default=0)))
+    triples, checked = _measured(_in_one_unit(named) or _bare(lengths), grid.at(min(rows, default=0)))
     every = [c for own in triples for c in own.columns]
     if not triples or len({c.unit.name for c in every if c.unit}) > 1:
         return None
@@ -111,6 +116,9 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
         c.role in (None, "measured") and c.step < 1 < c.values[0] for c in lengths
     ):
         return None  # whole places, at which lengths were measured
+    if any(_a_radius(c, own) for own in triples for c in lengths if c not in every):
+        what = "its points lie round a centre, from which a column has their distances, as in circular tests"
+        raise NotReadError(what, where=grid.at(rows[0]), fix=OF_CIRCLES)
     reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
     alone = not checked and sum(own.wide for own in named) == 1
     reading.beside_lengths = alone and bool(_COUNTED.sub("", triples[0].head).strip())
@@ -128,6 +136,17 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     for labels in reading.labels:
         labels |= {key: _LETTER.sub(" ", text).strip() or text for key, text in labels.items() if key[0] == "head"}
     return reading if _places(np.array(reading.figures).reshape(-1, 3)) else None
+
+
+def _a_radius(column: FigureColumn, of: Triple) -> bool:
+    """Whether it is how far places are from the origin in one plane, to the printed digits."""
+    own = of.values
+    if not column.full or len(of.columns) < len(COORDINATES) or len(own) < _PROBED or np.isnan(own).any():
+        return False
+    step = 1.5 * max(column.step, *(c.step for c in of.columns if c.i >= 0))
+    return any(
+        np.abs(np.hypot(own[:, a], own[:, b]) - column.values).max() <= step for a, b in combinations(range(3), 2)
+    )
 
 
 def _places(xyz: Floats) -> bool:
@@ -176,6 +195,21 @@ def _named(columns: Sequence[FigureColumn], levels: Mapping[str, float]) -> list
         return []  # a coordinate of one of several points is called otherwise
     threes = ((three, rest) for rest, own in whole for three in zip(*(own[axis] for axis in "xyz"), strict=True))
     return [_three(three, " ".join(rest).strip()) for three, rest in threes]
+
+
+def _in_one_unit(triples: Sequence[Triple]) -> list[Triple]:
+    """Those that are not the same again in another unit, to the printed digits."""
+
+    def again(one: Triple, other: Triple) -> bool:
+        units = [[c.unit for c in t.columns] for t in (one, other)]
+        (a, *_), (b, *_) = units
+        if a is None or b is None or a.name == b.name or any(u not in (own[0],) for own in units for u in own):
+            return False
+        factor = b.metres / a.metres
+        slack = one.columns[0].step + other.columns[0].step * factor
+        return bool(np.nanmax(np.abs(one.values - other.values * factor), initial=0.0) <= slack)
+
+    return [t for k, t in enumerate(triples) if not any(again(t, other) for other in triples[:k])]
 
 
 def _bare(columns: Sequence[FigureColumn]) -> list[Triple]:
@@ -287,7 +321,9 @@ def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -
         reading = SheetReading("points", measured[0].unit or grid.unit_beside(own), None, checked)
         others = [r for r, kind in enumerate(grid.kinds) if kind == "figures" and not _has_axis(grid, r)]
         reading.taken, reading.others = {"x_mm, y_mm, z_mm": measured}, [*rows, *others]
-        reading.collect(grid, own, columns, [i, *(c.i for c in fine)])
+        three = ((c, c.values[: len(own)].reshape(-1, 3)) for c in columns)
+        apart = [c.i for c, values in three if np.isfinite(values).all() and np.ptp(values, axis=1).any()]
+        reading.collect(grid, own, columns, [i, *(c.i for c in fine), *apart])
         if not _threes([{**one, ("name", ""): stem} for one, stem in zip(reading.beside, stems, strict=True)]):
             return None
         for k in range(0, len(own), 3):

@@ -39,6 +39,7 @@ _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball th
 # what speaks for a way, the strongest first
 _TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED, _AT_LEAST = 6.0, 5.0, 4.0, 3.0, 2.0, 1.0
 _APART = 3  # times what repeats scatter, which is more than drift
+_SINGLE = 1.1  # names for each place, at most, of points that are measured in turn
 _FEW, _SEVERAL = 3, 6  # points, which may be anything, and whose order alone says nothing
 
 
@@ -86,6 +87,9 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     place = places(xyz)
     found = varying(labels, lengths=False)
     ways = [*filter(None, (_grouped(of, found, place, xyz) for of in _labels(found)))]
+    each = int(place.max()) + 1  # of which a few have two names
+    whole = (f for f in found if each <= f[1].max() < _SINGLE * each and fixes(f[1], place))
+    ways += (Grouping(_NAMED, None, 0 * place, f[1], f) for f in whole)
     plate = len(xyz) <= _COMPARED and _on_a_plate(xyz[np.unique(place, return_index=True)[1]])
     named = any(way.of is None and way.rank and way.at.max() + 1 < len(xyz) for way in ways)  # names that come again
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):

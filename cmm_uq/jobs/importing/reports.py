@@ -223,6 +223,9 @@ def _feature(match: re.Match[str], line: int, where: str) -> Row | None:
 _FIELD = re.compile(r"K(?P<key>\d{4})(?:/(?P<which>\d+))?\s+(?P<text>.*)")
 
 
+_OF_AXIS = re.compile(r"(?<![^\W\d_])[XYZ](?![^\W\d_])", re.IGNORECASE)
+
+
 class Qdas(TextReport):
     """Q-DAS transfer files: of each characteristic name (K2002), nominal value (K2101), unit (K2142) and values.
 
@@ -257,7 +260,7 @@ class Qdas(TextReport):
                 raise NotReadError("marks a value as invalid (K0002)", where=at, fix="Take it out")
             for which, text in values:
                 name, nominal = (said.get((one, which), "") for one in ("2002", "2101"))
-                if not which or not nominal:
+                if not which or not (nominal or _OF_AXIS.search(name)):
                     raise NotReadError("has no nominal value (K2101)", where=at, fix="Export K2001 ff. too")
                 counted[which] += 1
                 rows.append(("", [name or which, f"{counted[which]}", nominal, text.strip()], line))

@@ -326,6 +326,13 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
     return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
 
 
+def of_feature(grid: CutSheet, row: int) -> bool:
+    """Whether the text right above a block says that it is of a plane, a line, or something else that has no place."""
+    block = grid.block_of[row]
+    words = [plain_words(grid.line(k)) for k in block.above]
+    return any(own and own[0] in words_of("rows")["feature"] and not any(map(str.isdigit, own)) for own in words)
+
+
 def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str] | None:
     """Rows with figures beside those that are read of a sheet; ``None`` where one of them may be measured."""
     rows, columns = {r for one in readings for r in one.rows}, {c.i for one in readings for c in one.source}
@@ -351,8 +358,9 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
         within = (
             first <= row < last or 0 < grid.sheet.lines[row] - grid.sheet.lines[last] == row - last
         )  # without a gap
-        within |= readings[0].kind == "points" and columns <= {*figures}
-        if figures and within and row not in summed and not _explained(grid, row, figures, rows, columns):
+        within |= readings[0].kind == "points" and row > first and columns <= {*figures}
+        known = row in summed or (readings[0].kind == "points" and of_feature(grid, row))
+        if figures and within and not known and not _explained(grid, row, figures, rows, columns):
             return None
         told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures and row > first else []
     blank = [cell for one in readings for cell in one.blank]

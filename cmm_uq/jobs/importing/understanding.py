@@ -36,7 +36,7 @@ from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths, axis_in
 from cmm_uq.jobs.importing.numbering import numbered_points
-from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, rows_left_out, said_by
+from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, of_feature, rows_left_out, said_by
 
 _COMPARED = 5000  # points of sheets
 ROWS_MOST = 20_000  # of a sheet that is understood this way
@@ -224,7 +224,9 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
         for read in (lengths + places if grid.placed(own) else places + lengths) if own else ():
             try:
-                reading = read(grid, blocks, own)
+                reading = read(
+                    grid, blocks, own if read in lengths else [row for row in own if not of_feature(grid, row)]
+                )
             except EitherError as error:
                 problem, reading = problem or error, None
             if reading is not None and (

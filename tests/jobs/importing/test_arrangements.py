@@ -179,3 +179,61 @@ def test_figures_that_begin_with_nought_are_no_thousands() -> None:
     found = read(["Nom;Contrôle;Mesuré [mm]", *rows])
     assert found.columns["x_mm"][0] == 0.0
     assert groups(found) == [1] * 3 + [2] * 3
+
+
+def test_nominal_values_in_rows_of_axes_are_no_names() -> None:
+    """Whole ones, of which only the first stands beside the name."""
+    lines = ["Feature;Axis;Nominal;Actual;Error"]
+    for k in range(9):
+        for axis, nominal in zip("XYZ", (80 + 110 * (k % 3), 140 + 110 * (k // 3), 95), strict=True):
+            lines.append(
+                f"{f'Sphere {k + 1}' if axis == 'X' else ''};{axis};{nominal};{nominal + 0.0003 * k:.4f};{0.0003 * k:.4f}"
+            )
+    assert groups(read(lines, unit="mm")) == [1] * 9
+
+
+def test_the_place_of_a_plane_is_no_point() -> None:
+    lines = ["Units: mm"]
+    for k, sort in enumerate(("Sphere", "Sphere", "Plane   Best Fit", "Circle", "Sphere")):
+        lines += [f"Step: {k + 1}", f"ball{'abcde'[k]}", sort, "                      Actual     Nominal"]
+        lines += [
+            f"       {a} Location   {v + k * k:9.4f}   {v + k * k:9.4f}"
+            for a, v in zip("XYZ", (100.5, 200.25, -50.125), strict=True)
+        ]
+    assert sorted(read(lines).columns["x_mm"].tolist()) == [100.5, 101.5, 109.5, 116.5]
+
+
+def test_the_same_places_in_two_units_are_read_once() -> None:
+    rows = [f"T{k},{k * 3.25:.4f},{7 - k * 1.5:.4f},{k % 3 + 0.125:.4f}" for k in range(6)]
+    rows = [",".join([row, *(f"{float(v) * 25.4:.4f}" for v in row.split(",")[1:])]) for row in rows]
+    found = read(["Name,X (in),Y (in),Z (in),X (mm),Y (mm),Z (mm)", *rows])
+    assert found.columns["x_mm"][1] == pytest.approx(3.25 * 25.4)
+    with pytest.raises(CmmUqError, match="may both be measured"):
+        read(["Name,X (in),Y (in),Z (in),X (mm),Y (mm),Z (mm)", *rows[:-1], rows[-1].replace(",", ",1", 1)])
+
+
+def test_a_few_of_many_names_at_places_of_others_are_points_of_their_own() -> None:
+    rows = [
+        f"{'granite' if k < 9 else 'edge'}{k},{(k * 37) % 101 + 0.013:.3f},{(k * 53) % 97:.3f},{k % 7:.3f}"
+        for k in range(1, 40)
+    ]
+    rows.append(rows[4].replace("granite", "edge"))
+    assert groups(read(["Name,X,Y,Z", *rows], unit="mm")) == [1] * 40
+
+
+def test_figures_ahead_of_a_table_are_no_points_of_it() -> None:
+    lines = ["title,Plate", "location,250.0,316.0,50.0", "id,mmt_x,mmt_y,mmt_z"]
+    assert (
+        len(
+            read(
+                [*lines, *(f"{k},{133.0 * (k % 3) + 0.001:.4f},{133.0 * (k // 3):.4f},0.0012" for k in range(9))],
+                unit="mm",
+            ).lines
+        )
+        == 9
+    )
+
+
+def test_places_round_a_centre_with_their_radii_are_a_circular_test() -> None:
+    rows = [f"{100.003 * np.cos(a):.4f};{100.003 * np.sin(a):.4f};100.0030" for a in np.arange(60) / 9.5]
+    assert "circular test" in problem(["Centre: X=400.0 Y=300.0 Z=-150.0", "X [mm];Y [mm];Rayon [mm]", *rows])

@@ -10,6 +10,7 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import Block, CutSheet
+from cmm_uq.jobs.importing.coordinates import OF_CIRCLES
 from cmm_uq.jobs.importing.factors import senses, way_of, ways_of
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, without_derived
@@ -100,5 +101,4 @@ def circle_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> N
     if name is None or not any(c.may_be_length and c.unit for c in columns):
         return None
     what = f"{name!r} goes round a circle, as in circular tests, and nothing says its points"
-    fix = "Give x_mm, y_mm and z_mm, from radius and angle (docs/reference/columns.md, circular_test)"
-    return NotReadError(what, where=grid.at(rows[0]), fix=fix)
+    return NotReadError(what, where=grid.at(rows[0]), fix=OF_CIRCLES)
