@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import json
 import multiprocessing
 import os
@@ -32,6 +33,7 @@ os.environ["CMM_UQ_RECORDS"] = "none"
 from benchmarks.tampering import page  # noqa: E402
 from benchmarks.tampering.cases import SEED, case  # noqa: E402
 from benchmarks.tampering.certificates import bases, good_job  # noqa: E402
+from cmm_uq.app.cli import NEW_OBJECTS  # noqa: E402
 
 WORK = ROOT / "build" / "tampering"
 
@@ -82,7 +84,10 @@ def _run(work: Any, path: Path, count: int, workers: int) -> None:
     began, command = time.monotonic(), ["git", "rev-parse", "--short=8", "HEAD"]
     commit = subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip()
     spawn = multiprocessing.get_context("spawn")
-    with spawn.Pool(workers, maxtasksperchild=400) as pool, path.open("a", encoding="utf-8") as file:
+    with (
+        spawn.Pool(workers, gc.set_threshold, (NEW_OBJECTS,), maxtasksperchild=400) as pool,
+        path.open("a", encoding="utf-8") as file,
+    ):
         for record in pool.imap_unordered(work, left, chunksize=1):
             file.write(json.dumps(record | {"commit": commit}, ensure_ascii=False) + "\n")
             file.flush()

@@ -137,6 +137,7 @@ def _read(path: Path) -> tuple[list[bytes], list[bytes]]:
     with installed():
         from asn1crypto import crl, pem, x509
     content = content_of(path, KEY_BYTES, "Name a PEM file of the certificates that you trust")
+    content = content.removeprefix(b"\xef\xbb\xbf")  # as an editor of Windows begins a file
     found: dict[str, list[bytes]] = {"CERTIFICATE": [], "X509 CRL": []}
     try:
         whole: list[tuple[str, Any, bytes]] = [("X509 CRL" if path.suffix == ".crl" else "CERTIFICATE", {}, content)]

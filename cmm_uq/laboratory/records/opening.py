@@ -75,8 +75,13 @@ def _file(path: Path, create: bool, read_only: bool) -> Engine:
     _check_file(path, create)
     mode = "ro" if read_only else "rwc" if create else "rw"
     if read_only and not os.access(path.parent, os.W_OK):
-        # without its -shm file a database in WAL mode can only be read as one that nobody writes
-        mode = "ro&immutable=1"
+        log, shared = (Path(f"{path}-{end}") for end in ("wal", "shm"))
+        if not log.exists() or not log.stat().st_size:
+            # without its -shm file a database in WAL mode can only be read as one that nobody writes
+            mode = "ro&immutable=1"
+        elif not shared.exists():
+            problem, fix = f"newest entries are in {log.name} still", "Copy both into a folder that can be written to"
+            raise CmmUqError(problem, where=str(path), fix=fix)
     uri = f"{path.absolute().as_uri()}?mode={mode}"
 
     def connect() -> sqlite3.Connection:

@@ -51,7 +51,9 @@ def inquiry(folder: Path, again: Again, trust: list[Path] | None) -> Inquiry:
 
 
 @pytest.mark.long
-def test_a_signed_certificate_is_verified(signed: Path, again: Again, trusted: list[Path]) -> None:
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"], ids=["plain", "BOM"])
+def test_a_signed_certificate_is_verified(signed: Path, again: Again, trusted: list[Path], mark: bytes) -> None:
+    trusted[0].write_bytes(mark + trusted[0].read_bytes())
     found = inquiry(signed, again, trusted)
     assert found.word == "VERIFIED", found.findings + found.unchecked
     assert sum("by A. Huber, on 2026-03-02 09:30 UTC" in note for note in found.notes) == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -105,6 +106,26 @@ def test_what_is_opened_to_be_read_is_not_written_to(place: Path) -> None:
     with open_records(place, read_only=True) as records:
         with pytest.raises(OutputError, match="read only"):
             records.append("sent", {})
+        assert records.head()[0] == 4
+
+
+def test_entries_that_stand_in_the_log_are_not_passed_over_where_nothing_can_be_written(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A database that is copied while somebody writes, to a medium that is read only or a folder that is closed."""
+    copy = tmp_path / "copy" / place.name
+    copy.parent.mkdir()
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode, **how: mode != os.W_OK and access(path, mode, **how))
+    with open_records(place) as records, records.reading():
+        assert records.append("sent", {}).number == 5
+        for end in ("", "-wal"):
+            shutil.copy(f"{place}{end}", f"{copy}{end}")
+        with open_records(place, read_only=True) as reader:  # beside who writes
+            assert reader.head()[0] == 5
+    refused(copy, "newest entries are in records.db-wal still. Copy both", read_only=True)
+    Path(f"{copy}-wal").unlink()
+    with open_records(copy, read_only=True) as records:
         assert records.head()[0] == 4
 
 
