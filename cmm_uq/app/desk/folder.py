@@ -89,6 +89,8 @@ class DeskFolder(Application):
             for one in machines
             if one.file(".pdf") and not one.part
         ]
+        if len(certificates) > 1:  # none is meant before one is chosen
+            certificates.insert(0, ("", say("choose it")))
         return p.page("desk/part.html", DESK, draft=draft, certificates=certificates)
 
     def plan(self, request: WebRequest) -> WebResponse:
@@ -101,6 +103,8 @@ class DeskFolder(Application):
         form = read_form(request)
         one, folder = self.drafts.read(form.get("draft", "")), form.get("folder", "").strip()
         self.check_new(folder)
+        if not form.get("certificate"):
+            raise CmmUqError("the certificate of the machine is not chosen", fix="Go back, and choose it")
         certificate = place.below(self.root, form.get("certificate", "")).relative_to(self.root).as_posix()
         self.reader.ask(
             "create_part",

@@ -53,6 +53,8 @@ def create_part(
         given[PART] = {"not_measured": ["*"]}
     machine = certificate_files(Path(certificate))
     stated = {key: value_of(questions.plain_number(text.strip())) for key, text in facts.items() if text.strip()}
+    if (gradient := "environment.u_gradient_k_per_m") in stated:
+        stated[gradient] = [stated[gradient]] * 3
     for dotted, value in stated.items():
         table, _, key = dotted.partition(".")
         if table != "stylus":

@@ -53,8 +53,16 @@ def test_a_part_passes_or_fails_from_its_plan_and_its_points(calibrated: Visitor
     given = {"draft": draft, "folder": "plate-7", "certificate": f"reports/{certificate}", "date": "2026-03-02"}
     stated = {"part.cte_per_k": "11,5e-6", "part.u_cte_per_k": "0.5e-6", "stylus.u_diameter_um": "0.3"}
     given |= stated | {"environment.u_part_k": "0.1", "environment.u_scales_k": "0.1", "form.field_um": "1"}
-    refused = calibrated.post("/desk/part", **{**given, "certificate": "../x.pdf"})
-    assert refused.status == 409
+    given |= {
+        "environment.scales_cte_per_k": "8e-6",
+        "environment.u_gradient_k_per_m": "0,1",
+        "environment.u_drift_k": "0.05",
+    }
+    given |= {"placing.u_fixture_um": "0.2", "probing.u_operator_um": "0.1", "stylus.lobing_um": "0.3"}
+    for wrong in ("../x.pdf", ""):
+        refused = calibrated.post("/desk/part", **{**given, "certificate": wrong})
+        assert refused.status == 409
+    assert "is not chosen" in refused.text
     answer = calibrated.post("/desk/part", **given)
     assert answer.headers.get("location") == "/desk/job?name=plate-7", answer.text
     page = calibrated.get("/desk/job?name=plate-7").text
