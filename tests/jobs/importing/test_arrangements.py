@@ -237,3 +237,9 @@ def test_figures_ahead_of_a_table_are_no_points_of_it() -> None:
 def test_places_round_a_centre_with_their_radii_are_a_circular_test() -> None:
     rows = [f"{100.003 * np.cos(a):.4f};{100.003 * np.sin(a):.4f};100.0030" for a in np.arange(60) / 9.5]
     assert "circular test" in problem(["Centre: X=400.0 Y=300.0 Z=-150.0", "X [mm];Y [mm];Rayon [mm]", *rows])
+
+
+@pytest.mark.parametrize("head", ["Hoek (graden)", "Angolo [gradi]", "Winkel [°]", "角度"])
+def test_deviations_by_angle_are_a_circular_test(head: str) -> None:
+    rows = [f"{5 * k}\t{np.sin(k / 9):.1f}\t{np.cos(k / 7):.1f}" for k in range(72)]
+    assert "circular_test" in problem(["Radial dR (um)", "", f"{head}\tCCW\tCW", *rows])

@@ -17,7 +17,8 @@ from cmm_uq.jobs.importing.lengths.evidence import differences, families, follow
 from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, settled_base
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like
 
-_MOST_OF_A_TURN, _DEGREES = 300, re.compile(r"°|\bdeg", re.IGNORECASE)
+_MOST_OF_A_TURN = 300
+_DEGREES = re.compile(r"°|度|\b(?:deg|gra[dus]|stop|stup)", re.IGNORECASE)
 _FEWEST = 3  # targets of an axis
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 
@@ -98,7 +99,7 @@ def circle_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> N
     columns = columns_in(grid, blocks, rows)
     spans = ((c.heading, np.nanmax(c.values) - np.nanmin(c.values)) for c in columns if _DEGREES.search(c.heading))
     name = next((name for name, span in spans if span > _MOST_OF_A_TURN), None)
-    if name is None or not any(c.may_be_length and c.unit for c in columns):
+    if name is None or len(columns) < 2:
         return None
     what = f"{name!r} goes round a circle, as in circular tests, and nothing says its points"
     return NotReadError(what, where=grid.at(rows[0]), fix=OF_CIRCLES)
