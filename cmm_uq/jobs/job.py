@@ -278,6 +278,9 @@ class Job:
         )
         if self.facts.artefact.traced and self.facts.certified_on_this_machine:
             lapsed += (CIRCULAR,)
+        if beyond := int(sum(self.points.columns.get("extrapolated", ()))):
+            what = say("error maps that reach all points ({count} were corrected beyond them)", count=beyond)
+            lapsed += ((what, "[machine] error_map"),)
         return replace(
             stated, short_gauge=self.short_gauge, clauses=self.clauses, uncertainty=uncertainty, lapsed=lapsed
         )

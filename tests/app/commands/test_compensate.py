@@ -90,7 +90,11 @@ def test_points_beyond_the_map_are_refused_with_their_line_or_flagged(job: Path,
     with pytest.raises(CmmUqError, match=r"ballbar\.csv.*line \d+"):
         write_compensated(short, tmp_path / "out")
     write_compensated(short, tmp_path / "flagged", beyond="extrapolate")
-    assert read_job(tmp_path / "flagged").points.columns["extrapolated"].sum() == 1
+    flagged = read_job(tmp_path / "flagged")
+    assert flagged.points.columns["extrapolated"].sum() == 1
+    lapsed = [text for text, _ in flagged.circumstances.lapsed]  # by which nothing passes
+    assert "error maps that reach all points (1 were corrected beyond them)" in lapsed
+    assert not any("beyond" in text for text, _ in read_job(short).circumstances.lapsed)
 
 
 def test_the_job_itself_is_not_written_over(job: Path) -> None:
