@@ -116,6 +116,8 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
         c.role in (None, "measured") and c.step < 1 < c.values[0] for c in lengths
     ):
         return None  # whole places, at which lengths were measured
+    if any(_between(c, a, b) for a, b in combinations(triples, 2) for c in lengths if c not in every):
+        return None  # places as they were set up, between which lengths were measured
     if any(_a_radius(c, own) for own in triples for c in lengths if c not in every):
         what = "its points lie round a centre, from which a column has their distances, as in circular tests"
         raise NotReadError(what, where=grid.at(rows[0]), fix=OF_CIRCLES)
@@ -136,6 +138,13 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     for labels in reading.labels:
         labels |= {key: _LETTER.sub(" ", text).strip() or text for key, text in labels.items() if key[0] == "head"}
     return reading if _places(np.array(reading.figures).reshape(-1, 3)) else None
+
+
+def _between(column: FigureColumn, a: Triple, b: Triple) -> bool:
+    """Whether it is how far two places of each row are apart, known ten times better than those."""
+    coarse = min(c.step for c in (*a.columns, *b.columns))
+    away = np.linalg.norm(a.values - b.values, axis=1) - column.values if a.values.shape == b.values.shape else np.inf
+    return column.full and 9 * column.step < coarse < 1 and bool(np.max(np.abs(away)) < 2 * coarse)
 
 
 def _a_radius(column: FigureColumn, of: Triple) -> bool:

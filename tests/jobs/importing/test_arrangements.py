@@ -212,13 +212,15 @@ def test_the_same_places_in_two_units_are_read_once() -> None:
         read(["Name,X (in),Y (in),Z (in),X (mm),Y (mm),Z (mm)", *rows[:-1], rows[-1].replace(",", ",1", 1)])
 
 
-def test_a_few_of_many_names_at_places_of_others_are_points_of_their_own() -> None:
-    rows = [
-        f"{'granite' if k < 9 else 'edge'}{k},{(k * 37) % 101 + 0.013:.3f},{(k * 53) % 97:.3f},{k % 7:.3f}"
-        for k in range(1, 40)
-    ]
-    rows.append(rows[4].replace("granite", "edge"))
-    assert groups(read(["Name,X,Y,Z", *rows], unit="mm")) == [1] * 40
+def test_a_place_under_two_names_of_many_is_two_points() -> None:
+    lines = ["X;Y;Z"]
+    for k in range(12):
+        n = k % 11  # the last where the first was
+        rows = [f"{n * 37 % 101 + 0.01 * m:.3f};{n * n * 53 % 97:.3f};{n * 29 % 83:.3f}" for m in range(3)]
+        lines += [f"Pos {k + 1}", *rows]
+    found = read(lines, unit="mm")
+    assert groups(found) == [1] * 36
+    assert found.columns["point"].tolist() == [k + 1 for k in range(12) for _ in range(3)]
 
 
 def test_figures_ahead_of_a_table_are_no_points_of_it() -> None:
@@ -243,3 +245,15 @@ def test_places_round_a_centre_with_their_radii_are_a_circular_test() -> None:
 def test_deviations_by_angle_are_a_circular_test(head: str) -> None:
     rows = [f"{5 * k}\t{np.sin(k / 9):.1f}\t{np.cos(k / 7):.1f}" for k in range(72)]
     assert "circular_test" in problem(["Radial dR (um)", "", f"{head}\tCCW\tCW", *rows])
+
+
+def test_coarse_places_between_which_lengths_were_measured_are_no_points() -> None:
+    """As set up, to 0.01 inch, below words that nobody knows; the lengths to 0.00001."""
+    ways = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0.6, 0.8, 0), (0, 0.6, 0.8), (0.8, 0, 0.6)]
+    rows = []
+    for k, way in enumerate(ways, 1):
+        ends = [[6.0 + k, 18.0 - k, 10.0], [6.0 + k + 19.69 * way[0], 18.0 - k + 19.69 * way[1], 10.0 + 19.69 * way[2]]]
+        rows.append(";".join([str(k), *(f"{v:.2f}" for end in ends for v in end), f"{19.6852 + k * 1e-5:.5f}"]))
+    with pytest.raises(CmmUqError) as asked:
+        read(["Brogu;Kilba A X;Kilba A Y;Kilba A Z;Kilba B X;Kilba B Y;Kilba B Z;Trumi", *rows], unit="inch")
+    assert "points_per_measurement" not in str(asked.value.fix)
