@@ -59,6 +59,9 @@ Stated = Mapping[str, tuple[str, str]]
 """Places of lines by name, as a file says them, with ? for what it leaves open, and its words."""
 
 
+_SAME_LENGTH = 0.1  # mm, within which lengths of runs of their own are one length
+
+
 @dataclass
 class MeasuredLengths:
     """Lengths of a sheet, of each its line by name, reference, run, measured value, mm, and line of the file."""
@@ -94,8 +97,7 @@ def placed(
                          where=f"{where} line {table.lines[bare.index(True)]}",
                          fix="Give it for all, or read the sheets one by one: sheet")  # fmt: skip
     number: dict[tuple[str, float | None], int] = {}
-    keyed = zip(table.names, table.reference, strict=True)
-    measurements = [number.setdefault(key, len(number) + 1) for key in keyed]
+    measurements = [number.setdefault(key, len(number) + 1) for key in _measured_again(table)]
     lines = [place_of(places[name]) for name in table.names]
     start, way = (np.array([line[k] for line in lines]) for k in (0, 1))
     xyz = np.stack([start, start + np.array(table.measured)[:, None] * way], axis=1).reshape(-1, 3)
@@ -107,6 +109,21 @@ def placed(
         columns[REFERENCE] = np.array([[0.0, reference] for reference in table.reference], dtype=np.float64).ravel()
     columns |= {name: np.repeat(values, 2) for name, values in table.beside.items()}
     return columns, (_told(wanted, places, by_file),), [line for line in table.lines for _ in range(2)]
+
+
+def _measured_again(table: MeasuredLengths) -> list[tuple[str, float | None]]:
+    """Of each length its line and reference, of one that a laser measures anew in each run that of the shortest."""
+    runs: dict[tuple[str, float], set[int]] = {}
+    for name, reference, run in zip(table.names, table.reference, table.repeat, strict=True):
+        if reference is not None:
+            runs.setdefault((name, reference), set()).add(run)
+    same: dict[tuple[str, float | None], tuple[str, float | None]] = {}
+    first, taken = ("", -np.inf), set[int]()
+    for key in sorted(runs):
+        if key[0] != first[0] or key[1] - first[1] > _SAME_LENGTH or taken & runs[key]:
+            first, taken = key, set()
+        same[key], taken = first, taken | runs[key]
+    return [same.get(key, key) for key in zip(table.names, table.reference, strict=True)]
 
 
 def _told(names: Sequence[str], places: Mapping[str, str], by_file: Stated) -> Fact:

@@ -103,6 +103,25 @@ def test_planned_places_of_both_balls_are_where_a_line_lies() -> None:
     assert table.columns["z_mm"][13] == pytest.approx(-219.99, abs=0.02)
 
 
+def test_a_length_that_a_laser_measures_in_every_run_is_one_length() -> None:
+    """Two blocks as near to each other, each with all runs, are two."""
+    head, lengths = "Line,Run,Reference length (mm),Measured length (mm)\n", (200.0, 550.0, 900.0, 1250.0)
+    rows = "".join(
+        f"1,{run},{of + off:.4f},{of + off + 0.001 * run:.4f}\n"
+        for of in lengths
+        for run, off in ((1, -0.0127), (2, 0.0065), (3, -0.0066))
+    )
+    table = read(head + rows, lines={"1": "along X from 0,0,0"})
+    assert table.columns["measurement"].tolist() == np.repeat([1, 2, 3, 4], 6).tolist()
+    assert table.columns["repeat"].tolist() == np.tile([1, 1, 2, 2, 3, 3], 4).tolist()
+    assert table.columns["reference_mm"][1:6:2].tolist() == [199.9873, 200.0065, 199.9934]
+    blocks = "".join(
+        f"1,{run},{of:.4f},{of + 0.001 * run:.4f}\n" for of in (200.0, 200.05, 550.0, 900.0) for run in (1, 2, 3)
+    )
+    table = read(head + blocks, lines={"1": "along X from 0,0,0"})
+    assert len(np.unique(table.columns["measurement"])) == 4
+
+
 @pytest.mark.parametrize(("table", "question"), [
     ("Line;Nominal;Measured\n1;100;100.002\n1;250;250.003\n", "may be in mm or in inch"),
     ("Line;Nominal (mm);Deviation\n1;100;2\n1;250;3\n", "nothing says the unit of 'Deviation': µm or mm"),
