@@ -329,7 +329,7 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
 def of_feature(grid: CutSheet, row: int) -> bool:
     """Whether the text right above a block says that it is of a plane, a line, or something else that has no place."""
     block = grid.block_of[row]
-    words = [plain_words(grid.line(k)) for k in block.above]
+    words = [plain_words(grid.line(k)) for k in block.above[-1:]]
     return any(own and own[0] in words_of("rows")["feature"] and not any(map(str.isdigit, own)) for own in words)
 
 

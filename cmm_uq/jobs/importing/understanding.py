@@ -224,9 +224,8 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
         for read in (lengths + places if grid.placed(own) else places + lengths) if own else ():
             try:
-                reading = read(
-                    grid, blocks, own if read in lengths else [row for row in own if not of_feature(grid, row)]
-                )
+                of_places = [row for row in own if not of_feature(grid, row)] or own
+                reading = read(grid, blocks, own if read in lengths else of_places)
             except EitherError as error:
                 problem, reading = problem or error, None
             if reading is not None and (

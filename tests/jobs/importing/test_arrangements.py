@@ -257,3 +257,15 @@ def test_coarse_places_between_which_lengths_were_measured_are_no_points() -> No
     with pytest.raises(CmmUqError) as asked:
         read(["Brogu;Kilba A X;Kilba A Y;Kilba A Z;Kilba B X;Kilba B Y;Kilba B Z;Trumi", *rows], unit="inch")
     assert "points_per_measurement" not in str(asked.value.fix)
+
+
+def test_an_alignment_named_above_the_one_table_leaves_nothing_out() -> None:
+    rows = [f"Ball {k};{130.0 * k + 0.0013:.4f};{k * k * 11.5:.4f};{k * 7.25:.4f}" for k in range(1, 9)]
+    for between in ([], ["Exported,2024-02-06"]):
+        assert len(read(["Alignment;Machine", *between, "Name;X;Y;Z", *rows], unit="mm").lines) == 8
+        coordinates = [
+            f"Ball {k};Centre {a};{v:.4f}"
+            for k in range(1, 9)
+            for a, v in zip("XYZ", (130.0 * k, k * k, 7 - k), strict=True)
+        ]
+        assert len(read(["Alignment;Machine", *between, "Name;Control;Meas", *coordinates], unit="mm").lines) == 8
