@@ -65,7 +65,10 @@ def appending(pdf: bytes) -> IncrementalPdfFileWriter:
             return generic.ArrayObject([prev.trailer["/ID"][0] if "/ID" in prev.trailer else drawn, drawn])
 
     try:
-        return Appending(io.BytesIO(pdf))
+        writer = Appending(io.BytesIO(pdf))
+        if writer.prev.encrypted:
+            raise CmmUqError("is encrypted, which no PDF of cmm-uq is", fix="Name the PDF as cmm-uq wrote it")
+        return writer
     except (PdfError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise CmmUqError(f"cannot be read as a PDF: {error}", fix="Name a PDF that is whole") from None
 

@@ -187,6 +187,8 @@ def test_a_file_from_elsewhere_is_signed_as_a_copy(key: Path, tmp_path: Path) ->
     refused = run("sign", file, "--key", key)
     assert refused.returncode == 2
     assert "is of no set that cmm-uq wrote" in refused.stderr
+    missing = run("sign", tmp_path / "there-is-none.pdf", "--key", key)
+    assert (missing.returncode, "No such file" in missing.stderr) == (2, True)
     done = run("sign", file, "--key", key, "--out", tmp_path / "signed", "--json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)

@@ -255,6 +255,14 @@ def test_what_is_no_pdf_is_refused(content: bytes, held: Held, trust: Trust) -> 
         sign_pdf(content, held.signer, seal=None, at=SIGNED)
 
 
+def test_a_pdf_that_is_encrypted_is_not_signed(pdf: bytes, held: Held) -> None:
+    out = io.BytesIO()
+    with pikepdf.open(io.BytesIO(pdf)) as opened:
+        opened.save(out, encryption=pikepdf.Encryption(owner="a", user="b"))
+    with pytest.raises(CmmUqError, match="is encrypted"):
+        sign_pdf(out.getvalue(), held.signer, seal=None, at=SIGNED)
+
+
 def test_a_file_without_a_signature_has_none(pdf: bytes, trust: Trust) -> None:
     assert signatures_of_pdf(pdf, trust) == ()
 

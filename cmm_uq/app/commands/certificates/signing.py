@@ -15,7 +15,7 @@ from typing import Any
 
 from cmm_uq.app.commands.files import opened
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.files.limits import SIGNED_BYTES, content_of
+from cmm_uq.base.files.limits import SIGNED_BYTES, check_file, content_of
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.output import Owner, finish_interrupted, read_manifest, staged
 from cmm_uq.certificate import sign
@@ -110,6 +110,7 @@ def sign_files(
     manifest = read_manifest(folder)
     for path in paths:
         if manifest is None or path.name not in manifest.files:
+            check_file(path, "Name a certificate that was written")
             raise CmmUqError("is of no set that cmm-uq wrote", where=str(path), fix="Give --out DIR for a signed copy")
     assert manifest is not None  # noqa: S101 - there is at least one path
     with opened(records, folder, make=False, create=False) as history:
