@@ -168,11 +168,6 @@ class MachineState:
         """(k,) mean of the modelled coefficients."""
         return np.asarray(self.draws.mean(axis=0))
 
-    @cached_property
-    def deviations(self) -> Floats:
-        """(M, k) of the draws from their mean."""
-        return self.draws - self.mean
-
     @property
     def corrects(self) -> Floats:
         """(k,) coefficients that it corrects."""

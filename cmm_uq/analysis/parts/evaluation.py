@@ -224,7 +224,7 @@ class Evaluator:
             return follow(np.asarray(drawn))
         table, followed = self._followed.get(key, (None, None))
         if followed is None or table is not drawn.table:
-            followed = follow(drawn.table)
+            followed = np.concatenate([follow(part) for part in drawn.parts()])
             self._followed[key] = drawn.table, followed
         return np.asarray(followed[drawn.rows])
 

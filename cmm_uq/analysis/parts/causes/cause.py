@@ -18,7 +18,7 @@ are moved along their normals: a displacement across the normal changes a distan
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -31,6 +31,7 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 
 LARGE = 1000  # points of a feature from which on its points are not drawn one coordinate after the other
+_AT_ONCE = 1000  # rows of a table
 _NOTHING = 1e-12  # part of the largest variance below which a component of a random field is rounding
 _UNSEEN_MM = 1e-11  # root mean square displacement for one unit of a coefficient below which a component is left out
 _FACTORED = 32  # coefficients up to which no components are looked for; a field, one factor, has the fewest already
@@ -44,20 +45,32 @@ Covariance = Callable[[slice], Floats]  # covariance (m, n) of some points with 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Coefficients (N, K) that are rows of a table: what follows from them linearly needs following once a row of it."""
+    """Coefficients (N, K), rows of a table less its mean: what follows from them linearly needs following once a row of it.
+
+    The difference is as large as the table, and is held by nobody.
+    """
 
     table: Floats  # (M, K)
-    rows: Ints  # (N,) of it
+    mean: Floats  # (K,)
+    rows: Ints  # (N,) of the table
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def of(self, columns: Ints) -> Floats:
         """(N, k) of some coefficients."""
-        return np.asarray(self.table[np.ix_(self.rows, columns)])
+        found = self.table[np.ix_(self.rows, columns)]
+        found -= self.mean[columns]
+        return found
+
+    def parts(self) -> Iterator[Floats]:
+        """(m, K) of all rows of the table, some at a time."""
+        return (self.table[i : i + _AT_ONCE] - self.mean for i in range(0, len(self.table), _AT_ONCE))
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:
-        return np.asarray(self.table[self.rows], dtype=dtype)
+        found = self.table[self.rows]
+        found -= self.mean
+        return np.asarray(found, dtype=dtype)
 
 
 Drawn = Floats | Rows  # coefficients (N, K)

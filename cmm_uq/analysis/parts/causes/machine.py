@@ -172,10 +172,10 @@ def modelled(
         if period:
             e += np.ascontiguousarray(columns) @ state.mean[own]
     factors = [effect.name for effect in state.effects for _ in effect.coefficients]
-    deviations, drift = state.deviations, np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
+    drift = np.append(state.drift, np.zeros(len(factors) - len(state.drift)))
 
     def draw(random: np.random.Generator, n: int) -> Drawn:
-        drawn = Rows(deviations, random.integers(len(deviations), size=n))
+        drawn = Rows(state.draws, state.mean, random.integers(len(state.draws), size=n))
         if not state.drift.any():
             return drawn
         return np.asarray(drawn) + random.standard_normal((n, len(drift))) * drift
