@@ -188,3 +188,37 @@ def test_two_figures_above_a_table_are_no_targets_of_its_columns() -> None:
     ]
     with pytest.raises(CmmUqError, match="no column is x_mm"):
         runs_of("\n".join([*rows, ""]), **{"1": "along X from 0,0,0"})
+
+
+def blocks(titles: tuple[str, ...], lengths: list[tuple[float, ...]], *beside: str) -> list[str]:
+    rows = []
+    for i, (title, own) in enumerate(zip(titles, lengths, strict=True)):
+        rows += [title, ";".join((*beside, "Kelvo [mm];Trumi [mm];Zapoli [µm]"))]
+        for k, length in enumerate(own):
+            for r in range(2 if "Pliko" in beside else 1):
+                named = [str({"Pliko": r + 1, "Qe": k + 1}[one]) for one in beside]
+                rows.append(
+                    ";".join((*named, f"{length}", f"{length + error(i, k, r) / 1000:.4f}", f"{error(i, k, r):.1f}"))
+                )
+    return rows
+
+
+def test_titles_and_cells_with_places_name_lines_in_any_language() -> None:
+    """Each line has lengths of its own, so that nothing else tells the lines apart."""
+    own = [(30.0004, 120.0007), (240.0001, 390.0012), (150.0003, 330.0009)]
+    titles = ("Brogu 1: oki X, wul (30 / 310 / 320)", "Brogu 2: oki Y, wul (300 / 20 / 320)", "Brogu 3")
+    assert [len(one) for one in read(lengths_of(blocks(titles, own)))] == [2, 2, 2]
+
+
+def test_numbered_titles_of_an_unknown_word_are_asked_about_and_pages_are_none() -> None:
+    own = [(30.0004, 120.0007), (240.0001, 390.0012)]
+    with pytest.raises(CmmUqError, match="titles such as 'Brogu 1' may name lines"):
+        imported("\n".join([*blocks(("Brogu 1", "Brogu 2"), own), ""]).encode(), "a.csv", ImportKeys())
+    assert len(read(lengths_of(blocks(("Page 1", "Page 2"), own)))) == 1
+
+
+def test_an_unknown_title_and_an_unknown_column_are_asked_about() -> None:
+    """Either may count lines, and the other runs."""
+    rows = blocks(("Brogu 1", "Brogu 2"), [LENGTHS, LENGTHS], "Pliko", "Qe")
+    with pytest.raises(CmmUqError, match="nothing says which lengths lie on one line"):
+        imported("\n".join([*rows, ""]).encode(), "a.csv", ImportKeys())

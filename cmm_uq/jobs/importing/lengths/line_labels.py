@@ -25,6 +25,8 @@ from cmm_uq.jobs.importing.factors import (
     varying,
 )
 from cmm_uq.jobs.importing.format import NotReadError
+from cmm_uq.jobs.importing.header import plain_words, words_of
+from cmm_uq.jobs.importing.lengths.places import says_figures
 
 _FEW = 4  # references that may differ by chance
 
@@ -46,13 +48,11 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     count, several, found = len(reference), bool(reference.max(initial=0) > 0), varying(labels, lengths=True)
     if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
         found = [(f[0], f[1], RUN if f[0].sort == "head" and counting(f[0].values) else f[2]) for f in found]
-    above = [f for f in found if f[0].sort in ("title", "sheet") and f[2] == LINE and not fixes(f[1], reference)]
+    found = [(f[0], f[1], LINE if f[2] is None and _says_places(f[0]) else f[2]) for f in found]
+    above = [f for f in found if f[0].sort in ("title", "sheet", "block") and not fixes(f[1], reference)]
     # numbers of the lengths of each line, though they are called positions
     found = [
-        (f[0], f[1], POINT)
-        if f[0].sort == "column" and f[2] == LINE and any(fixes(together(one[1], f[1]), reference) for one in above)
-        else f
-        for f in found
+        (f[0], f[1], POINT) if f[0].sort == "column" and _counts_lengths(f, above, reference) else f for f in found
     ]
     plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
     run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
@@ -65,6 +65,7 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     line, run = _told_apart(reference, [f for f in plain if f[2] in (None, POINT)], line, run, place, lined=lined)
     # else one length on each line, which are named and not counted
     line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
+    _refuse_unnamed(found, line)
     key = together(reference, *(f[1] for f in line))
     each = key if run is None else together(key, run[1])
     if each.max() + 1 < count if run is not None else len({*Counter(key.tolist()).values()}) > 1:
@@ -77,6 +78,33 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     numbers = in_turn(key) if run is None else numbered_runs(run[0].values)
     used = [f[0].words for f in (*line, *([run] if run else []))]
     return names or [titled[-1] if titled else "1"] * count, numbers, used
+
+
+def _says_places(label: Label) -> bool:
+    """Whether titles or cells are of lines, for they say where one lies."""
+    return label.sort in ("title", "column") and any(map(says_figures, {*label.values}))
+
+
+def _counts_lengths(column: Counted, above: Sequence[Counted], reference: Ints) -> bool:
+    """Whether a column numbers the lengths below each title, of lines where a word calls it a line itself."""
+    label, own, of = column
+    numbers = of == LINE or (of is None and _digits(label))
+    titles = [f[1] for f in above if of is None or (f[2] == LINE and f[0].sort != "block")]
+    return numbers and any(fixes(together(one, own), reference) for one in titles)
+
+
+def _refuse_unnamed(found: Sequence[Counted], line: Sequence[Counted]) -> None:
+    """Titles that are numbered, and whose word is not known, may be of lines."""
+    pages = words_of("rows")["page"]
+    for label, _, of in found if not line else ():
+        if (
+            label.sort == "title"
+            and of is None
+            and counting(label.values)
+            and pages.isdisjoint(plain_words(label.values[0]))
+        ):
+            what = f"titles such as {label.values[0]!r} may name lines"
+            raise NotReadError(what, fix='Say so with a word for a line ahead of each number, as in "Line 1"')
 
 
 def _told_apart(
@@ -100,9 +128,14 @@ def _told_apart(
         if apart() == count or apart(one[1]) == apart():
             continue
         whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
+        unsaid = any(f[2] is None for f in line) and one[2] is None and one[0].sort == "column"
         if run is None and (named or lined) and _digits(one[0]):
             run = one
-        elif line or whole or not (one[0].sort == "column" or (one[0].sort == "part" and _digits(one[0]))):
+        elif (
+            (line and not (unsaid and run is None))
+            or whole
+            or not (one[0].sort == "column" or (one[0].sort == "part" and _digits(one[0])))
+        ):
             line.append(one)
         else:
             fix = f'Say by which column: columns = {{ line = "{one[0].words}" }}'
