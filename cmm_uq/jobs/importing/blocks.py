@@ -328,13 +328,14 @@ class CutSheet:
             texts = [self.text(row, k) for k in filled]
             odd = any(
                 len(text) > 60
-                or (len(filled) < 4 and "=" in text)
+                or (len(filled) < 4 and "=" in text and not says_figures(text))
                 or len(_PRINTED.findall(_BRACKETS.sub("", text))) > 1
                 for text in texts
             )
             odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3
             over = [k for k in filled if k in numbers]
-            placed = self.place(row) and sum(map(says_figures, texts)) < _SEVERAL  # else above each column
+            each = over == filled and len(over) + 1 >= len(numbers)  # then they stand above columns
+            placed = self.place(row) and not each and sum(map(says_figures, texts)) < _SEVERAL
             if len(head) == DEEPEST or odd or not self._ruled.issuperset(between) or placed:
                 break
             apart = not head and (len(filled) < 2 or not over) and filled != over

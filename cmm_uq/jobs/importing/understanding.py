@@ -285,6 +285,8 @@ class Understanding:
         (checked, of, size), (others, less, least) = (
             (one.reading.checked, len(one.reading.figures), np.size(one.reading.figures)) for one in (self, other)
         )
+        if self.reading.kind == other.reading.kind == "lengths" and checked and others:
+            return (of, checked) > (less, others)  # a column that one of them loses was measured
         return 2 * size >= least and ((checked, of) > (others, less) or size > 2 * least)
 
     def unit(self, keys: ImportKeys, where: str, reach_mm: float | None) -> tuple[WrittenUnit, Fact]:

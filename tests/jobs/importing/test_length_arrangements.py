@@ -222,3 +222,47 @@ def test_an_unknown_title_and_an_unknown_column_are_asked_about() -> None:
     rows = blocks(("Brogu 1", "Brogu 2"), [LENGTHS, LENGTHS], "Pliko", "Qe")
     with pytest.raises(CmmUqError, match="nothing says which lengths lie on one line"):
         imported("\n".join([*rows, ""]).encode(), "a.csv", ImportKeys())
+
+
+def test_names_of_an_unknown_word_that_several_lengths_share_are_asked_about() -> None:
+    rows = ["Brogu;Kelvo [mm];Trumi [mm];Zapoli [µm]"]
+    for i, own in enumerate([(30.0004, 120.0007), (240.0001, 390.0012)]):
+        rows += [
+            f"{f'Brogu {i + 1}' if k == 0 else ''};{v};{v + error(i, k, 0) / 1000:.4f};{error(i, k, 0):.1f}"
+            for k, v in enumerate(own)
+        ]
+    with pytest.raises(CmmUqError, match="titles such as 'Brogu 1' may name lines"):
+        imported("\n".join([*rows, ""]).encode(), "a.csv", ImportKeys())
+
+
+@pytest.mark.parametrize("lines", [2, 3, 5])
+def test_figures_among_heads_are_what_lengths_across_are_called_by(lines: int) -> None:
+    """With places beside the names of lines, and whichever run is by chance the largest of all."""
+    rows = ["Unità: mm", "Posizione;Prova;" + ";".join(map(str, LENGTHS))]
+    for i in range(lines):
+        axis, *others = ("XYZ"[i % 3], *(one for one in "XYZ" if one != "XYZ"[i % 3]))
+        name = f"Posizione {i + 1}: asse {axis}, {others[0]}={400 + i}, {others[1]}=300"
+        rows += [";".join((name, f"{r + 1}", *(measured(i, k, r) for k in range(4)))) for r in range(2)]
+    assert read(lengths_of(rows)) == expected(lines, 2)
+
+
+def test_a_run_that_is_the_largest_in_a_few_rows_is_no_extreme_of_the_others() -> None:
+    """The first of the second line is the larger of both of the first, in three lengths."""
+    rows = [
+        "Units: mm;;Position 1;;Position 2;",
+        "Nominal;Calibrated;Run 1;Run 2;Run 1;Run 2",
+        "100;100.0002;100.0011;100.0004;100.0011;100.0007",
+        "300;300.0005;300.0009;300.0013;300.0013;300.0003",
+        "500;499.9998;500.0008;500.0002;500.0008;500.0016",
+    ]
+    assert [len(own) for own in read(lengths_of(rows))] == [6, 6]
+
+
+def test_a_verdict_is_no_number_of_a_run() -> None:
+    rows = ["Position;Calibrated [mm];Measured 1 [mm];Measured 2 [mm];Pass"]
+    rows += [
+        f"Position {i + 1};{LENGTHS[k]};{measured(i, k, 0)};{measured(i, k, 1)};Pass"
+        for i in range(3)
+        for k in range(4)
+    ]
+    assert read(lengths_of(rows)) == expected(3, 2)

@@ -17,6 +17,7 @@ from cmm_uq.jobs.importing.factors import numberless, way_of
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading
 
 _PART = 4  # of the figures of a turned sheet, the least that is read
+_MANY = 12  # rows in which no run is the largest, or the mean, of others by chance
 _LEAST = 4  # rows by which a column is known to follow from another
 
 
@@ -84,7 +85,12 @@ def families(columns: Sequence[FigureColumn]) -> list[list[FigureColumn]]:
 def without_derived(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
     """Columns that are no mean, range, deviation or extreme of others."""
     left = [*columns]
+    several = {
+        c.i for own in families(columns) if len(own) > 1 for c in own
+    }  # of few rows one may be the largest by chance
     for c in columns:
+        if c.i in several and c.role != "summary" and len(c.values) < _MANY:
+            continue
         others = [o for o in left if o is not c]
         if any(c.sums_up(own, worst=True) for own in sets_of(others, c)):
             left.remove(c)

@@ -94,17 +94,13 @@ def _counts_lengths(column: Counted, above: Sequence[Counted], reference: Ints) 
 
 
 def _refuse_unnamed(found: Sequence[Counted], line: Sequence[Counted]) -> None:
-    """Titles that are numbered, and whose word is not known, may be of lines."""
+    """Titles and names of several lengths that are numbered, and whose word is not known, may be of lines."""
     pages = words_of("rows")["page"]
-    for label, _, of in found if not line else ():
-        if (
-            label.sort == "title"
-            and of is None
-            and counting(label.values)
-            and pages.isdisjoint(plain_words(label.values[0]))
-        ):
-            what = f"titles such as {label.values[0]!r} may name lines"
-            raise NotReadError(what, fix='Say so with a word for a line ahead of each number, as in "Line 1"')
+    for label, own, of in found if not line else ():
+        shared = label.sort == "title" or (label.sort == "column" and not _digits(label) and 2 * own.max() < len(own))
+        if shared and of is None and counting(label.values) and pages.isdisjoint(plain_words(label.values[0])):
+            fix = 'Say so with a word for a line ahead of each number, as in "Line 1"'
+            raise NotReadError(f"titles such as {label.values[0]!r} may name lines", fix=fix)
 
 
 def _told_apart(
@@ -149,7 +145,7 @@ def _one_run(labels: Sequence[Label], runs: Sequence[Counted], place: str) -> Co
         raise NotReadError("no line is named", where=unnamed[0], fix="Complete the row")
     run = min(runs, key=lambda f: f[1].max(), default=None)
     heads = next((len({*f[0].values}) for f in runs if f[0].sort == "head"), 0)
-    numbering = [one for one in labels if one.sort == "column" and counting(one.values)]
+    numbering = [one for one in labels if one.sort == "column" and counting(one.values) and len({*one.values}) > 1]
     columns = [one.words for one in numbering if hint(one.words, lengths=True) == RUN]
     if (heads and columns) or (run is not None and any(not fixes(run[1], f[1]) for f in runs)):
         what = f"{(columns or [runs[0][0].words])[0]!r} counts runs, and so do {heads or 'other'} columns"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmm_uq.jobs.importing.blocks import CutSheet
+from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import Cell, Sheet
 from cmm_uq.jobs.importing.lengths.length_columns import BASES
 from cmm_uq.jobs.importing.roles import like, said
@@ -15,6 +16,7 @@ from cmm_uq.jobs.importing.roles import like, said
 _WIDEST = 300  # columns
 _HEADS = 2  # rows of them
 _MOST = 60  # such parts of a sheet; points whose coordinates differ look like them
+_COARSE = 0.05  # mm: nominal lengths are printed no finer
 _APART = 0.5  # of references or targets, in the unit of the file
 
 
@@ -45,6 +47,9 @@ def turned(grid: CutSheet) -> Sheet | None:
             return None
         above = [grid.text(base, k) for k in range(first)]
         several = sum(map(bool, above)) > 1  # then each names what stands below it, and none the row
+        if several and not part.name and {"line", "run"} <= {hint(text, lengths=True) for text in above}:
+            fine = any((grid.figure(base, k) or (0, 1))[1] < _COARSE for k in part.columns)
+            part.name = "reference" if fine else "nominal"  # figures among heads are what the lengths are called by
         for k in range(first):  # what stands ahead of rows becomes the head of columns
             names = [text for row in (*part.over, *part.beside) if (text := grid.text(row, k))] or [above[k]] * several
             texts = [grid.text(row, k) for row in (*part.over, *part.rows)]
