@@ -249,7 +249,7 @@ def test_figures_among_heads_are_what_lengths_across_are_called_by(lines: int) -
 def test_a_run_that_is_the_largest_in_a_few_rows_is_no_extreme_of_the_others() -> None:
     """The first of the second line is the larger of both of the first, in three lengths."""
     rows = [
-        "Units: mm;;Position 1;;Position 2;",
+        "Units: mm;;X axis;;Y axis;",
         "Nominal;Calibrated;Run 1;Run 2;Run 1;Run 2",
         "100;100.0002;100.0011;100.0004;100.0011;100.0007",
         "300;300.0005;300.0009;300.0013;300.0013;300.0003",

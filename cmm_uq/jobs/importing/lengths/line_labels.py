@@ -145,7 +145,8 @@ def _one_run(labels: Sequence[Label], runs: Sequence[Counted], place: str) -> Co
         raise NotReadError("no line is named", where=unnamed[0], fix="Complete the row")
     run = min(runs, key=lambda f: f[1].max(), default=None)
     heads = next((len({*f[0].values}) for f in runs if f[0].sort == "head"), 0)
-    numbering = [one for one in labels if one.sort == "column" and counting(one.values) and len({*one.values}) > 1]
+    columned = (one for one in labels if one.sort == "column" and any(map(str.isdigit, "".join(one.values))))
+    numbering = [one for one in columned if counting(one.values)]
     columns = [one.words for one in numbering if hint(one.words, lengths=True) == RUN]
     if (heads and columns) or (run is not None and any(not fixes(run[1], f[1]) for f in runs)):
         what = f"{(columns or [runs[0][0].words])[0]!r} counts runs, and so do {heads or 'other'} columns"
