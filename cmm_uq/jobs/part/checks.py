@@ -264,7 +264,7 @@ def _characteristics(facts: PartFile, features: Mapping[str, Probed], places: Pl
 
 def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
     """What keeps a characteristic from being evaluated."""
-    checks = (_of_its_kinds, _association, _nominal_orientation, _limits_of_the_value, _whole_frame)
+    checks = (_of_its_kinds, _association, _form, _nominal_orientation, _limits_of_the_value, _whole_frame)
     return next((found for check in checks if (found := check(one, features))), None)
 
 
@@ -298,6 +298,18 @@ def _association(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Pr
             return (f"{name!r} is a {kind}, which has no association {one.association!r}", "association",
                     f"Give one of {', '.join(ASSOCIATIONS[kind])}, or leave it out")  # fmt: skip
     return None
+
+
+def _form(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:
+    """That a form is seen: by more points than determine the feature, which leave none, and would conform whatever it is."""
+    if one.what not in ("straightness", "flatness", "roundness", "cylindricity", "sphericity"):
+        return None
+    (feature,) = (features[name] for name in one.features)
+    least, count = FEWEST[feature.facts.kind], len(feature.points)
+    if count > least:
+        return None
+    problem = f"{count} points determine {one.features[0]!r} and show nothing of its form"
+    return problem, "features", f"Probe {least + 1} points or more, or leave the {one.what} out"
 
 
 def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed]) -> Problem | None:

@@ -93,6 +93,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({**features(*(target(f"t{i}", x) for i, x in enumerate((10.0, 90.0, 50.0)))),
       "alignment": {"datums": ["A", "t0", "t1", "t2"]}}, "the datum 't2' fixes nothing"),
     # characteristics
+    ({"feature": [{**PLANE_A, "strategy": None, "points_mm": [[5.0, 5.0, 0.0], [115.0, 5.0, 0.0], [60.0, 75.0, 0.0]]},
+                  *TABLES["feature"][1:]]}, "3 points determine 'A' and show nothing of its form"),
     (asked(what="size", features=["bore"], association="tangent"), "'bore' is a cylinder, which has no association 'tangent'"),
     (asked(what="symmetry", features=["A"], datums=["B"], tolerance_mm=0.1), "is a symmetry: the median plane"),
     (asked(what="concentricity", features=["bore"], datums=["A"], tolerance_mm=0.1), 'ask for "coaxiality"'),
