@@ -42,6 +42,7 @@ _AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012]?(?![^\W_]))", re.IGNORECASE
 _ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?0(?!\w)")
 _SEVERAL = 3  # places in a row, more than a line has
 _MEASURED = 0.05  # figures printed finer are no planned places
+_FINER = 50  # times, that lengths are printed finer than the places where they were measured
 
 
 def heading(path: Sequence[str]) -> str:
@@ -263,13 +264,17 @@ class CutSheet:
             if last[i + 1 : i + 3] == ["", ""] and text == "XYZ":
                 axes[i : i + 3] = "XYZ"  # one head over three
         six = [(i, axes[i]) for i, _ in heads if len(axes[i]) == 1]
-        fine = any((self.figure(row, i) or (0, 1))[1] < _MEASURED for row in block.rows for i, _ in six)
-        if fine or "".join(axis for _, axis in six) != "XYZXYZ":
-            return by_words  # or measured balls
+        if "".join(axis for _, axis in six) != "XYZXYZ":
+            return by_words
         found = {START: [i for i, _ in six[:3]], END: [i for i, _ in six[3:]]}
-        return (
-            found if any(self._as_far(block, found, i) for i in range(self.width) if i not in dict(six)) else by_words
-        )
+        others = [i for i in range(self.width) if i not in dict(six) and self._as_far(block, found, i)]
+        step = self._step(block, dict(six))
+        # finer ones are measured balls, unless a length beside them is much finer still
+        return found if others and (step >= _MEASURED or self._step(block, others) * _FINER <= step) else by_words
+
+    def _step(self, block: Block, columns: Iterable[int]) -> float:
+        """Of the finest figures of columns."""
+        return min((f[1] for row in block.rows for i in columns if (f := self.figure(row, i))), default=1.0)
 
     def _as_far(self, block: Block, columns: Mapping[str, Sequence[int]], i: int) -> bool:
         """Whether starts and ends are as far apart as the longest of the lengths in a column that were measured there."""

@@ -6,7 +6,7 @@ A deviation is measured minus reference to the printed digit, a mean the mean of
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -81,6 +81,12 @@ class FigureColumn:
         return bool(np.all(np.abs(own - np.round(own, 1)) < 1e-6))
 
     @property
+    def counted(self) -> set[str]:
+        """Its head, and the lowest part of it, with one figure for each number; nothing where it has none."""
+        texts = (self.heading, *(text for text in self.path[-1:] if any(map(str.isdigit, text))))
+        return {re.sub(r"\d+", "0", text.strip()) for text in texts}
+
+    @property
     def downwards(self) -> Floats:
         """Each figure in the rows below it too that have none."""
         there = np.flatnonzero(np.isfinite(self.values))
@@ -123,8 +129,7 @@ class FigureColumn:
 
         One whose head counts as theirs do is another run, though the last printed digit would let it be their mean.
         """
-        counted = re.sub(r"\d+", "0", self.heading)
-        alike = any(re.sub(r"\d+", "0", o.heading) == counted and o.heading != self.heading for o in others)
+        alike = any(self.counted & o.counted and o.heading != self.heading for o in others)
         own = np.column_stack([one.values for one in others]) if len(others) > 1 and not alike else np.array([np.nan])
         if not np.isfinite(own).all() or not self.full:
             return False
@@ -220,6 +225,11 @@ def names_length(path: Sequence[str]) -> bool:
 def said(path: Sequence[str]) -> Role | None:
     """The role that the words above a column say: that of a mean ahead of what it is of, in Asian words the longest."""
     texts = [without_unit(text.replace("\n", " "))[0] for text in path]
+    names = [hint(text, lengths=True) == LINE for text in texts]  # as ``Line E``, which is no error
+    texts = [
+        " ".join(own for own in text.split() if len(own) > 1) if of else text
+        for of, text in zip(names, texts, strict=True)
+    ]
     words = [word for text in texts for word in plain_words(text)]
     short = [own[-1] for text in texts for part in _ABBREVIATED.findall(text) if (own := plain_words(part))]
     of = words_of("lengths")
@@ -320,6 +330,17 @@ def each(grid: CutSheet) -> Iterator[tuple[list[Block], list[int]]]:
         yield blocks, [row for block in blocks for row in block.rows]
 
 
+def below_deviations(grid: CutSheet, rows: Iterable[int]) -> set[int]:
+    """Rows below a title that says that they hold deviations, with figures much smaller than those of the rows without it."""
+    titles = {row: grid.block_of[row].titles[row].values() for row in rows if row in grid.block_of}
+    counts = {row: sum(said([text]) == "deviation" for text in own) for row, own in titles.items()}
+    small = {row for row, count in counts.items() if count > min(counts.values())}
+    sizes: dict[int, list[float]] = {0: [], 1: []}
+    for row in counts:
+        sizes[row in small] += [abs(f[0]) for f in grid.figures[row] if f is not None and f[1] < 1]
+    return small if small and max(sizes[1], default=np.inf) < 0.1 * max(sizes[0], default=0.0) else set()
+
+
 def is_void(row: Sequence[Cell], *tables: str) -> bool:
     """Whether a cell of a row says that it is no measured point or length."""
     known = frozenset().union(*(words_of("rows")[table] for table in tables))
@@ -376,6 +397,8 @@ def _explained(
     """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
     cells, block = grid.sheet.rows[row], grid.block_of[row].rows
     if header.is_summary(cells) or is_void(cells, "void", "feature"):
+        return True
+    if row in below_deviations(grid, [row, *rows]):
         return True
     if said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary":
         return True

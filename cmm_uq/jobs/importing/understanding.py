@@ -36,7 +36,16 @@ from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths, axis_in
 from cmm_uq.jobs.importing.numbering import numbered_points
-from cmm_uq.jobs.importing.roles import SheetReading, each, is_void, joined, of_feature, rows_left_out, said_by
+from cmm_uq.jobs.importing.roles import (
+    SheetReading,
+    below_deviations,
+    each,
+    is_void,
+    joined,
+    of_feature,
+    rows_left_out,
+    said_by,
+)
 
 _COMPARED = 5000  # points of sheets
 ROWS_MOST = 20_000  # of a sheet that is understood this way
@@ -218,7 +227,8 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         usable = [
             row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
         ]
-        own = _layout(grid, usable) if usable else []
+        deviations = below_deviations(grid, usable)  # beside what they are of
+        own = _layout(grid, [row for row in usable if row not in deviations]) if usable else []
         readings: list[SheetReading] = []
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them

@@ -155,3 +155,84 @@ def test_a_row_whose_text_says_where_it_lies_is_measured_as_those_beside_it() ->
     found = imported("\n".join([*head, *rows, ""]).encode(), "e0.csv", ImportKeys())
     assert len(found.lines) == 2 * 3 * len(rows)
     assert found.places == {"X": "along X from 100,400,300", "D1": "from 100,100,50 to 700,700,550"}
+
+
+RANDOM = np.random.default_rng(11)
+SCATTER = np.round(RANDOM.normal(0.3, 0.5, (7, len(REFERENCE), RUNS)), 1)
+"""Deviations in µm of seven lines, printed to a tenth: of five lengths many a column is the mean or the range of others."""
+
+
+def told(rows: list[list[str]]) -> set[tuple[str, float, int, float]]:
+    return read(rows, ",")
+
+
+def wide(cells: list[list[str]], letters: str = "ABCDEFG") -> list[list[str]]:
+    heads = [["", "", *(text for a in letters for text in (f"Lijn {a}", *[""] * (RUNS - 1)))]]
+    heads += [["Nominaal (mm)", "Gekalibreerd (mm)", *(f"{r + 1}" for _ in letters for r in range(RUNS))]]
+    return [*heads, *cells]
+
+
+def expected(letters: str = "ABCDEFG") -> set[tuple[str, float, int, float]]:
+    lengths = [(i, k, r) for i in range(len(letters)) for k in range(len(REFERENCE)) for r in range(RUNS)]
+    return {
+        (f"Lijn {letters[i]}", REFERENCE[k], r + 1, round(REFERENCE[k] + SCATTER[i, k, r] / 1000, 4))
+        for i, k, r in lengths
+    }
+
+
+def test_letters_of_lines_are_no_units_nor_words_and_few_rows_are_no_sums() -> None:
+    """E is no error, C and F no degrees."""
+    rows = [
+        [
+            f"{REFERENCE[k]:.0f}",
+            f"{REFERENCE[k]:.4f}",
+            *(f"{SCATTER[i, k, r]:.1f}" for i in range(7) for r in range(RUNS)),
+        ]
+        for k in range(len(REFERENCE))
+    ]
+    assert told([["Afwijking = gemeten − gekalibreerd, in µm"], *wide(rows)]) == expected()
+
+
+def test_deviations_below_lengths_under_one_head_are_said_once() -> None:
+    rows = [
+        [
+            f"{REFERENCE[k]:.0f}", f"{REFERENCE[k]:.4f}",
+            *(f"{REFERENCE[k] + SCATTER[i, k, r] / 1000:.4f}" for i in range(7) for r in range(RUNS)),
+        ]
+        for k in range(len(REFERENCE))
+    ]  # fmt: skip
+    rows += [["Afwijking (µm)"]]
+    rows += [
+        [f"{REFERENCE[k]:.0f}", "", *(f"{SCATTER[i, k, r]:.1f}" for i in range(7) for r in range(RUNS))]
+        for k in range(len(REFERENCE))
+    ]
+    assert told(wide(rows)) == expected()
+
+
+def test_a_number_of_each_row_is_none_of_runs() -> None:
+    """Lengths in turn, each three times, with rows numbered on each line."""
+    rows: list[list[str]] = []
+    for i in range(LINES):
+        rows += [[f"MESSLINIE {i + 1}"], ["NR", "NENNMASS MM", "KALIBRIERT MM", "GEMESSEN MM"]]
+        for n, (k, r) in enumerate(((k, r) for k in range(5) for r in range(RUNS)), 1):
+            measured = REFERENCE[k] + MOTHER[i][k][r] / 1000
+            rows += [[f"{n}", f"{REFERENCE[k]:.0f}", f"{REFERENCE[k]:.4f}", f"{measured:.4f}"]]
+    assert told(rows) == {(f"MESSLINIE {one[0][-1]}", *one[1:]) for one in EXPECTED}
+
+
+def test_of_two_references_the_calibrated_one_is_that_of_lengths() -> None:
+    rows = [["測定位置", "基準寸法(mm)", "校正値(mm)", *(f"測定値{r + 1}(mm)" for r in range(RUNS)), "最大誤差(μm)"]]
+    for i in range(LINES):
+        for k in range(5):
+            measured = [REFERENCE[k] + one / 1000 for one in MOTHER[i][k]]
+            worst = max(MOTHER[i][k], key=abs)
+            rows += [
+                [
+                    f"Ova {i + 1}",
+                    f"{REFERENCE[k]:.0f}",
+                    f"{REFERENCE[k]:.4f}",
+                    *(f"{m:.4f}" for m in measured),
+                    f"{worst:.1f}",
+                ]
+            ]
+    assert told(rows) == EXPECTED

@@ -210,3 +210,29 @@ def test_what_names_and_figures_leave_open_is_asked_and_never_read_otherwise(
     assert all(read.values()), read
     assert {NAMES[0], NAMES[1]} <= read.keys()
     assert not turned or len(read) >= 5
+
+
+def test_whole_nominal_coordinates_name_no_measurement() -> None:
+    """A row for each axis, the feature in the first of them, and its diameter below."""
+    text = ["Feature;Axis;Nominal;Upper tol;Lower tol;Actual;Error"]
+    for ball, (x, y) in enumerate(((x, y) for y in (140, 250) for x in (80, 190, 300)), 1):
+        for n, (axis, nominal) in enumerate((("X", x), ("Y", y), ("Z", 95), ("Dia", 20))):
+            error = ((7 * ball + 3 * n) % 11 - 5) / 1e4
+            name = f"Sphere {ball}" * (n == 0)
+            text += [f"{name};{axis};{nominal};0.02;-0.02;{nominal + error:.4f};{error:.4f}"]
+    found = imported("\n".join([*text, ""]).encode(), "a.csv", ImportKeys(unit="mm"))
+    assert found.columns["point"].tolist() == [1, 2, 3, 4, 5, 6]
+    assert {*found.columns["measurement"].tolist()} == {1}
+
+
+def test_coarse_places_of_balls_beside_a_fine_length_say_where_it_lay() -> None:
+    """Set-up values in hundredths of an inch: what was measured is the length of the bar."""
+    text = ["POS;X;Y;Z;X;Y;Z;MEASURED LENGTH (IN);DEV. (IN)"]
+    for k in range(20):
+        length = 19.68520 + (7 * k % 13) / 1e5
+        text += [f"{k + 1};{6 + k:.2f};18.00;10.00;{25.69 + k:.2f};18.00;10.00;{length:.5f};{(7 * k % 13) / 1e5:.5f}"]
+    found = imported("\n".join([*text, ""]).encode(), "a.csv", ImportKeys(unit="inch"))
+    ends = np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"]).reshape(-1, 2, 3)
+    lengths = [25.4 * (19.68520 + (7 * k % 13) / 1e5) for k in range(20)]
+    np.testing.assert_allclose(np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1), lengths, rtol=1e-9)
+    assert ends[0, 0].tolist() == pytest.approx([152.4, 457.2, 254.0])

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.jobs.importing.factors import LINE, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Sheet, WrittenUnit, apart, unit_named
 from cmm_uq.jobs.importing.header import without_unit
 
@@ -51,7 +52,8 @@ def sign_of(rows: Sequence[Sequence[Cell]]) -> str:
 def unit_of(path: Sequence[str]) -> WrittenUnit | None:
     """The unit in the texts above a column: the lowest one."""
     for text in reversed(path):
-        if text and (unit := unit_named(text.strip("[]()<>{} ")) or without_unit(text.replace("\n", " "))[1]):
+        unit = text and (unit_named(text.strip("[]()<>{} ")) or without_unit(text.replace("\n", " "))[1])
+        if unit and (unit.sort == LENGTH or hint(text, lengths=True) != LINE):  # as ``Line C``
             return unit
     return None
 

@@ -128,7 +128,7 @@ def _base(
     open_ = without_derived([c for c in group if c.role is None])
     again = [c for c in (*named, *open_) if any(scatters(o, c) for o in group)]
     fine = [c for c in again if not c.round]
-    base = base or next((c for c in named if c.role == "reference"), None)
+    base = base or min((c for c in named if c.role == "reference"), key=lambda c: c.round, default=None)
     if base is None and len(fine) == 1:
         base = fine[0]
     elif base is None and named and measured and any(c.step < 1 for c in open_):

@@ -121,7 +121,9 @@ def _told_apart(
     others = [f for f in others if f not in columns or not any(g.max() > f[1].max() and fixes(g, f[1]) for g in more)]
     named = [f for f in others if f[0].sort in ("column", "part") and not _digits(f[0])]
     for one in sorted(others, key=order):
-        if apart() == count or apart(one[1]) == apart():
+        # whether it numbers lengths, each time that they were measured
+        rows = bool(line) and _digits(one[0]) and reference.max() > 0 and fixes(one[1], reference)
+        if rows or apart() == count or apart(one[1]) == apart():
             continue
         whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
         unsaid = any(f[2] is None for f in line) and one[2] is None and one[0].sort == "column"

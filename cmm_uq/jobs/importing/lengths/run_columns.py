@@ -73,7 +73,7 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     """The column of targets: called so, or from which others differ by what stands beside them, or the only large one."""
     large = [c for c in columns if np.ptp(c.values[np.isfinite(c.values)]) > 1 and not c.minute]
     called = [c for c in large if c.role in ("target", "nominal")]
-    if called:
+    if any(not c.counts for c in called) or (called and not any(c.step < 1 for c in large)):
         return min(called, key=lambda c: (c.counts, not c.round))  # and not their numbers, nor what was reached
     large = [c for c in large if c.role in (None, "measured", "reference") and not c.counts]
     near = [c for c in large if any(o is not c and like(c.values + 1000, o.values + 1000) for o in large)]
