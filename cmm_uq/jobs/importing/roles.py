@@ -6,7 +6,7 @@ A deviation is measured minus reference to the printed digit, a mean the mean of
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -14,11 +14,10 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.columns import OPTIONAL
-from cmm_uq.jobs.importing import header
 from cmm_uq.jobs.importing.blocks import DATED, Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import SMALL, unit_of
-from cmm_uq.jobs.importing.factors import LINE, RUN, Label, hint
-from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, WrittenUnit, converted, sort_of, unit_named
+from cmm_uq.jobs.importing.factors import LINE, Label, hint
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, WrittenUnit, converted, sort_of, unit_named
 from cmm_uq.jobs.importing.header import plain_words, understood, unspaced, without_unit, words_of
 
 Role = Literal["summary", "deviation", "reference", "measured", "target", "nominal"]
@@ -29,7 +28,6 @@ _OF_NAMES: Mapping[Role, str] = {
 }  # fmt: skip
 _ROLES = {name: role for role, names in _OF_NAMES.items() for name in names.split()}
 _CLAIMS: Mapping[Role, tuple[Role, ...]] = {"reference": ("reference", "nominal", "target")}
-_SEVERAL = re.compile(r"(?<![^\s])[+-]?\d+[.,]\d+\s+[+-]?\d+[.,]\d+(?!\S)")
 _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
 _FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
 _COARSE = 0.05  # mm: figures printed no finer than this are nominal, and exact
@@ -328,92 +326,3 @@ def each(grid: CutSheet) -> Iterator[tuple[list[Block], list[int]]]:
         by_head.setdefault(keys[-1] if keys else (str(heads), *own), []).append(block)
     for blocks in by_head.values():
         yield blocks, [row for block in blocks for row in block.rows]
-
-
-def below_deviations(grid: CutSheet, rows: Iterable[int]) -> set[int]:
-    """Rows below a title that says that they hold deviations, with figures much smaller than those of the rows without it."""
-    titles = {row: grid.block_of[row].titles[row].values() for row in rows if row in grid.block_of}
-    counts = {row: sum(said([text]) == "deviation" for text in own) for row, own in titles.items()}
-    small = {row for row, count in counts.items() if count > min(counts.values())}
-    sizes: dict[int, list[float]] = {0: [], 1: []}
-    for row in counts:
-        sizes[row in small] += [abs(f[0]) for f in grid.figures[row] if f is not None and f[1] < 1]
-    return small if small and max(sizes[1], default=np.inf) < 0.1 * max(sizes[0], default=0.0) else set()
-
-
-def is_void(row: Sequence[Cell], *tables: str) -> bool:
-    """Whether a cell of a row says that it is no measured point or length."""
-    known = frozenset().union(*(words_of("rows")[table] for table in tables))
-    return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
-
-
-def of_feature(grid: CutSheet, row: int) -> bool:
-    """Whether the text right above a block says that it is of a plane, a line, or something else that has no place."""
-    block = grid.block_of[row]
-    words = [plain_words(grid.line(k)) for k in block.above[-1:]]
-    return any(own and own[0] in words_of("rows")["feature"] and not any(map(str.isdigit, own)) for own in words)
-
-
-def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str] | None:
-    """Rows with figures beside those that are read of a sheet; ``None`` where one of them may be measured."""
-    rows, columns = {r for one in readings for r in one.rows}, {c.i for one in readings for c in one.source}
-    taken = rows | {r for one in readings for r in one.others}
-    summed = {r for one in readings for r in one.summaries}
-    heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
-    cells = (c for row in taken for c in (*grid.sheet.rows[row], *grid.block_of[row].titles[row].values()))
-    if any(isinstance(cell, str) and _SEVERAL.search(cell) for cell in cells):
-        return None  # cells that were not cut apart
-    told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
-    first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
-    for row in range(len(grid.sheet.rows)):
-        if grid.kinds[row] == "text" and first <= row < last and row not in heads:
-            own = [grid.figure(row, k) for k in columns]
-            if None not in own and any(f is not None and f[1] < 1 for f in own):
-                return None  # whatever else stands in it, it may be measured
-            text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
-            if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
-                told.append(header.shown(grid.sheet, row, header.REMARK))
-        if row in taken or grid.kinds[row] != "figures":
-            continue
-        figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in columns)]
-        within = (
-            first <= row < last or 0 < grid.sheet.lines[row] - grid.sheet.lines[last] == row - last
-        )  # without a gap
-        within |= readings[0].kind == "points" and row > first and columns <= {*figures}
-        known = row in summed or (readings[0].kind == "points" and of_feature(grid, row))
-        if figures and within and not known and not _explained(grid, row, figures, rows, columns):
-            return None
-        told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures and row > first else []
-    blank = [cell for one in readings for cell in one.blank]
-    if any(map(str.isdigit, "".join(grid.text(row, i) for row, i in blank))):
-        return None
-    places = (grid.sheet.at("", row, i, heading(grid.path(row, i))) for row, i in blank)
-    return told + [f"{place.removeprefix(': ').strip()}: nothing in the cell" for place in places]
-
-
-def _explained(
-    grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[int], columns: Collection[int]
-) -> bool:
-    """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
-    cells, block = grid.sheet.rows[row], grid.block_of[row].rows
-    if header.is_summary(cells) or is_void(cells, "void", "feature"):
-        return True
-    if row in below_deviations(grid, [row, *rows]):
-        return True
-    if said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary":
-        return True
-    alone = len(figures) < 2 or {*block}.isdisjoint(rows)
-    if (alone and {*columns}.isdisjoint(figures)) or grid.other_quantity(row):
-        return True
-    whole = [f is not None and f[1] >= 1 for f in (grid.figure(row, k) for k in figures)]
-    if len(figures) < 2 and all(whole) and not any((grid.figure(r, figures[0]) or (0, 1))[1] >= 1 for r in rows):
-        return True  # a count of something, below figures with digits behind the point
-    if alone and is_void([text for k in figures for text in grid.path(row, k)], "feature"):
-        return True
-    for k in {*figures} & {*columns}:
-        above = [f[0] for r in block if r in rows and (f := grid.figure(r, k))]
-        value, step = grid.figures[row][k] or (0.0, 1.0)
-        sums = (np.mean(above), max(above), min(above), np.ptp(above), np.std(above, ddof=1)) if len(above) > 1 else ()
-        if not any(abs(value - one) <= 1.05 * step for one in sums):
-            return False
-    return True

@@ -22,6 +22,7 @@ from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
+from cmm_uq.jobs.importing.cells.left_out import below_deviations, is_void, of_feature, rows_left_out
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
 from cmm_uq.jobs.importing.factors import codes, counted, hint
@@ -36,16 +37,7 @@ from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths, axis_in
 from cmm_uq.jobs.importing.numbering import numbered_points
-from cmm_uq.jobs.importing.roles import (
-    SheetReading,
-    below_deviations,
-    each,
-    is_void,
-    joined,
-    of_feature,
-    rows_left_out,
-    said_by,
-)
+from cmm_uq.jobs.importing.roles import SheetReading, each, joined, said_by
 
 _COMPARED = 5000  # points of sheets
 ROWS_MOST = 20_000  # of a sheet that is understood this way
