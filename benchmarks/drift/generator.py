@@ -9,7 +9,7 @@ artefact, and a few are simply wrong.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -65,7 +65,6 @@ class Machine:
     offset: float  # true error = offset + raw since the last adjustment
     rate: float
     adjusted: float = np.nan
-    steps: list[tuple[int, float]] = field(default_factory=list)  # day and size of each
 
     def truth(self, day: int) -> float:
         return float(self.offset + self.raw[day - self.first])

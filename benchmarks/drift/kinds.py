@@ -84,7 +84,7 @@ def _made(kind: str, random: np.random.Generator, around: Surroundings) -> Machi
         kind, 0, Certificates([], [], [], [], [], []), U_MEDIAN * np.exp(U_SPREAD * random.standard_normal()),
         float(random.uniform(0.3, 0.7)), raw, first, float(random.normal(0, FIRST_SD)), float(rate),
     )  # fmt: skip
-    machine.steps = sorted((first + at, size) for at, size in steps)
+    machine.steps = sorted((first + at, size) for at, size in steps)  # type: ignore[attr-defined]
     for day in days:
         calibrate(machine, int(day), around, random, as_left=bool(day == days[-1]))
     return machine

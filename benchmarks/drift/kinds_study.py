@@ -78,10 +78,10 @@ def dated(made: Sequence[Machine], prior: DriftPrior) -> dict[str, float]:
         named += len(steps)
         expected += sum(step.probability for step in steps)
         for step in steps:
-            true = [size for day, size in machine.steps if step.after - EPOCH < day <= step.by - EPOCH]
+            true = [size for day, size in machine.steps if step.after - EPOCH < day <= step.by - EPOCH]  # type: ignore[attr-defined]
             right += bool(true)
             inside += bool(true) and abs(sum(true) - step.size) <= 2 * step.u
-        for day, size in machine.steps:
+        for day, size in machine.steps:  # type: ignore[attr-defined]
             if abs(size) >= 0.4 * LIMIT and day <= machine.certificates.day[-1]:
                 large += 1
                 found_large += any(_has(step, day) for step in steps)
