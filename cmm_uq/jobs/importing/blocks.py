@@ -42,7 +42,7 @@ _AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012]?(?![^\W_]))", re.IGNORECASE
 _ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?0(?!\w)")
 _SEVERAL = 3  # places in a row, more than a line has
 _MEASURED = 0.05  # figures printed finer are no planned places
-_FINER = 50  # times, that lengths are printed finer than the places where they were measured
+FINER = 50  # times, that lengths are printed finer than the places where they were measured
 
 
 def heading(path: Sequence[str]) -> str:
@@ -270,7 +270,7 @@ class CutSheet:
         others = [i for i in range(self.width) if i not in dict(six) and self._as_far(block, found, i)]
         step = self._step(block, dict(six))
         # finer ones are measured balls, unless a length beside them is much finer still
-        return found if others and (step >= _MEASURED or self._step(block, others) * _FINER <= step) else by_words
+        return found if others and (step >= _MEASURED or self._step(block, others) * FINER <= step) else by_words
 
     def _step(self, block: Block, columns: Iterable[int]) -> float:
         """Of the finest figures of columns."""

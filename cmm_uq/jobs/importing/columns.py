@@ -19,6 +19,7 @@ from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, sem
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing.blocks import FINER
 from cmm_uq.jobs.importing.cells.encodings import decimal_sign, is_number, split_units, values_of
 from cmm_uq.jobs.importing.cells.figures import figure
 from cmm_uq.jobs.importing.factors import Label
@@ -117,15 +118,19 @@ def _refuse_lengths_along_axes(written: Written, place: str) -> None:
 
 
 def _refuse_places_of_lengths(written: Written, table: ExportTable, sign: str) -> None:
-    """Whole places, beside which measured lengths stand, are where those begin, and were not measured."""
+    """Places beside which lengths stand that are printed much finer are where those begin, and were not measured."""
     used, headings = {i for own in table.header.columns.values() for i in own}, table.header.headings
     beside = [
         i for i, head in enumerate(headings) if i not in used and (said([head]) == "measured" or names_length([head]))
     ]
     whole = all(np.all(values % 1 == 0) for axis in COORDINATES for values, _, _ in written.get(axis, ()))
-    for i in beside if whole else ():
-        if (first := figure(table.cells[i][0], sign)) and first[1] < 1 < first[0]:
-            what = f"X, Y and Z are whole, and {headings[i]!r} was measured there"
+    places = [table.cells[k] for axis in COORDINATES for k in table.header.columns.get(axis, ())]
+    coarse = (
+        1.0 if whole else min((f[1] for cells in places for cell in cells if (f := figure(cell, sign))), default=0.0)
+    )
+    for i in beside:
+        if (first := figure(table.cells[i][0], sign)) and first[0] > 1 and first[1] * (1 if whole else FINER) < coarse:
+            what = f"X, Y and Z are {'whole' if whole else 'coarse'}, and {headings[i]!r} was measured there"
             raise NotReadError(what, where=table.start, fix=_LENGTHS)
 
 

@@ -118,10 +118,15 @@ def _rank(column: FigureColumn) -> int:
 
 
 def _base(
-    group: Sequence[FigureColumn], small: Sequence[FigureColumn]
+    group: Sequence[FigureColumn], small: Sequence[FigureColumn], where: str
 ) -> tuple[FigureColumn | None, list[FigureColumn]] | None:
     """The reference among columns of one length each, and the measured ones; ``None`` where nobody says which is which."""
-    base = settled_base(group, differences(group, small))
+    pairs = differences(group, small)
+    base = settled_base(group, pairs)
+    for d, a, b in pairs:
+        if a is base and a.role == b.role not in BASES:
+            what = f"{a.heading!r} comes again, as a reference does, and {d.heading!r} is what it is less {b.heading!r}"
+            raise NotReadError(what, where=where, fix=said_by("reference_mm", [b], ", or the other"))
     group = [c for c in group if c.role != "summary" or c is base]  # figures know better than words which is none
     named = [c for c in group if c.role in BASES]
     measured = [c for c in group if c.role == "measured"]
@@ -152,7 +157,7 @@ def _lengths(
     least = max(0.01 * most, 0.2)
     little = [c for c in small if not c.counts and (np.nanmax(np.abs(c.values)) < least or np.nanmin(c.values) < 0)]
     small = [c for c in small if c.deviates or c in little]
-    if (found := _base(group, small)) is None:
+    if (found := _base(group, small, grid.at(rows[0]))) is None:
         return None
     base, source = found
     deviations, checked, factor = base is not None and not source, 0, 0.0
