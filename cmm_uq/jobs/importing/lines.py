@@ -128,14 +128,14 @@ def _measured_again(table: MeasuredLengths) -> list[tuple[str, float | None]]:
 
 def _told(names: Sequence[str], places: Mapping[str, str], by_file: Stated) -> Fact:
     """Where lines lie, of those that the file places with its words."""
-    words = {name: by_file[name][1] for name in names if by_file.get(name, ("",))[0] == places[name]}
-    shown = {name: {"name": Verbatim(name), "place": Verbatim(places[name])} for name in names}
-    told = [
-        say("{name}: {place}, as the file says: {words}", **shown[name], words=Verbatim(words[name]))
-        if name in words
-        else say("{name}: {place}", **shown[name])
-        for name in names
-    ]
+    told = []
+    for name in names:
+        line, place = Verbatim(name), Verbatim(places[name])
+        if by_file.get(name, ("",))[0] == place:
+            words = Verbatim(by_file[name][1])
+            told.append(say("{name}: {place}, as the file says: {words}", name=line, place=place, words=words))
+        else:
+            told.append(say("{name}: {place}", name=line, place=place))
     return Fact("lines", say("Lines"), semicolons(told))
 
 

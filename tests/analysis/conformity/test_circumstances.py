@@ -27,11 +27,11 @@ from cmm_uq.certificate.clauses import formal_warnings
 from cmm_uq.jobs.tables.conformity import (
     Circumstances,
     ConformityFacts,
-    MaximumPermissibleError,
     ProbeFacts,
     RatedConditions,
     TestUncertainty,
 )
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS

@@ -12,7 +12,8 @@ from cmm_uq.analysis.conformity.statement import GRAVEST, Statement
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
+from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 from cmm_uq.machine.model.kind import LENGTHS
 from tests.analysis.conformity.recorded import SEVEN, STATED, five, gauge
 

@@ -17,7 +17,8 @@ from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts
-from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
+from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 from cmm_uq.machine.model.kind import LENGTHS
 from tests.analysis.conformity.recorded import MACHINE, MIDDLE, SEVEN, STATED, Errors, bars, gauge
 from tests.recordings import with_columns

@@ -21,9 +21,9 @@ from cmm_uq.jobs.tables.conformity import (
     ConformityFacts,
     FalseAccept,
     GuardBand,
-    MaximumPermissibleError,
     Rule,
 )
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS
 from cmm_uq.maths.uncertainty.quantity import Quantity

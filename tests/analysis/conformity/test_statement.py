@@ -5,7 +5,8 @@ from __future__ import annotations
 from cmm_uq.analysis.conformity.decision import decide
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import Text, say
-from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError, Rule
+from cmm_uq.jobs.tables.conformity import ConformityFacts, Rule
+from cmm_uq.jobs.tables.length_formula import MaximumPermissibleError
 
 MPE = MaximumPermissibleError(a_um=2.5, k=300.0)
 FACTS = ConformityFacts(standard="ISO 10360-2:2009", mpe=MPE)
