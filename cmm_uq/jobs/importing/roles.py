@@ -48,6 +48,7 @@ class FigureColumn:
     step: float
     unit: WrittenUnit | None
     role: Role | None
+    stated: bool = False  # whether the job says the role
 
     @property
     def full(self) -> bool:
@@ -254,7 +255,7 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
         if grid.keys:
             role = _ROLES.get(name, "summary" if name or role in claimed else role)
             unit = unit or (UNITS[name[-2:]] if name.startswith("deviation_") else None)
-        found.append(FigureColumn(i, path, values, float(min(steps[np.isfinite(values)])), unit, role))
+        found.append(FigureColumn(i, path, values, float(min(steps[np.isfinite(values)])), unit, role, name in _ROLES))
     return found
 
 

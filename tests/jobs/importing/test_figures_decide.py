@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.cells.figures import unit_of
+from cmm_uq.jobs.importing.format import ImportKeys, unit_named
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, imported
 
 REFERENCE = (30.0004, 120.0007, 240.0001, 390.0012, 570.0009)
@@ -193,6 +194,15 @@ def test_letters_of_lines_are_no_units_nor_words_and_few_rows_are_no_sums() -> N
     assert told([["Afwijking = gemeten − gekalibreerd, in µm"], *wide(rows)]) == expected()
 
 
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [("Line temperature (°C)", "°C"), ("Line temperature °C", "°C"), ("Line C", None), ("Line error µm", "µm")],
+)
+def test_a_unit_that_is_written_is_one_beside_any_word(head: str, unit: str | None) -> None:
+    found = unit_of([head])
+    assert (found and found.name) == (unit and unit_named(unit).name)  # type: ignore[union-attr]
+
+
 def test_deviations_below_lengths_under_one_head_are_said_once() -> None:
     rows = [
         [
@@ -248,3 +258,14 @@ def test_a_reading_that_comes_again_and_is_more_by_the_error_is_asked_about() ->
             rows += [[f"{k}", f"{shown:.4f}", f"{shown - error / 1000:.4f}", f"{error:.1f}"]]
     with pytest.raises(CmmUqError, match="comes again, as a reference does"):
         imported("\n".join(map(";".join, rows)).encode(), "a.csv", ImportKeys())
+    for called in ("laser", "MMC"):  # what the job says stands, whatever comes again
+        columns = {"reference_mm": f"Lettura {called}"}
+        with pytest.raises(UnplacedError) as asked:
+            imported(
+                "\n".join(map(";".join, rows)).encode(),
+                "a.csv",
+                ImportKeys.model_validate({"columns": columns, "unit": "mm"}),
+            )
+        references = [one for each in asked.value.lengths for one in each.reference]
+        column = rows[0].index(f"Lettura {called}")
+        assert references == [float(row[column]) for row in rows[1:] if len(row) > 1]

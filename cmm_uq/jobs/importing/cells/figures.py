@@ -20,6 +20,7 @@ _SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*(\w+)", re.IGNORECASE)
 _MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
 SMALL = ("um", "nm", "microinch")  # units of deviations
 _POWER = 99  # of ten, beyond which a text is no figure
+_LETTERED = re.compile(r"\s[A-Z]\s*$")  # which names, and is no unit
 
 
 def figure(cell: Cell, sign: str) -> tuple[float, float] | None:
@@ -53,7 +54,7 @@ def unit_of(path: Sequence[str]) -> WrittenUnit | None:
     """The unit in the texts above a column: the lowest one."""
     for text in reversed(path):
         unit = text and (unit_named(text.strip("[]()<>{} ")) or without_unit(text.replace("\n", " "))[1])
-        if unit and (unit.sort == LENGTH or hint(text, lengths=True) != LINE):  # as ``Line C``
+        if unit and not (_LETTERED.search(text) and hint(text, lengths=True) == LINE):  # as ``Line C``
             return unit
     return None
 

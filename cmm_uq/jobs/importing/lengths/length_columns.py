@@ -103,11 +103,14 @@ def _refuse_far(grid: CutSheet, rows: Sequence[int], groups: Sequence[Sequence[F
 
 def settled_base(group: Sequence[FigureColumn], pairs: Sequence[Difference]) -> FigureColumn | None:
     """The column from which others differ by deviations beside them: it comes again, else by words, else by their sign."""
+    if stated := next((c for c in group if c.stated and c.role in BASES), None):
+        return stated
     of: dict[int, set[int]] = {c.i: set() for c in group}
     for _, a, b in pairs:
-        if scatters(b, a) or (not scatters(a, b) and _rank(a) < _rank(b)):
+        turned = scatters(b, a) or (not scatters(a, b) and _rank(a) < _rank(b))
+        if b.stated or (turned and not a.stated):
             a, b = b, a
-        of[b.i].add(a.i)
+        of[b.i] |= set() if b.stated else {a.i}
     most = max(map(len, of.values()), default=0)
     return min((c for c in group if len(of[c.i]) == most > 0), key=lambda c: (_rank(c), c.step), default=None)
 
