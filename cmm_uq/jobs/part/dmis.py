@@ -149,7 +149,9 @@ class _Program:
             if plain is None:
                 raise NotUnderstoodError("is no statement of DMIS that is read")
             major = plain["major"].upper()
-            if major in self.read:
+            if major == "RECALL":
+                self._frame(major, words_of(plain["rest"] or ""))
+            elif major in self.read:
                 self.read[major](words_of(plain["rest"] or ""))
             elif major not in PASSED:
                 raise NotUnderstoodError(f"is a statement {major}, which is not read")
@@ -176,8 +178,8 @@ class _Program:
         if length.upper() not in MILLIMETRES or angle.upper() not in DEGREES:
             raise CmmUqError(f"UNITS/{','.join(words)} is not read", where=self.place,
                              fix=f"Write it in {', '.join(MILLIMETRES)} and {' or '.join(DEGREES)}")  # fmt: skip
-        if self.nominal:
-            said = "the unit changes after features were defined"
+        if self.nominal or self.tolerances:
+            said = "the unit changes after features or tolerances were defined"
             raise CmmUqError(said, where=self.place, fix="Say UNITS once, at first")
         self.frame = replace(self.frame, millimetres=MILLIMETRES[length.upper()], degrees=DEGREES[angle.upper()])
 

@@ -20,7 +20,7 @@ from cmm_uq.jobs.importing.documents import child, three
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN
 from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, listed, number_of, text, whole_text
-from cmm_uq.jobs.part.feature import ASKS, What
+from cmm_uq.jobs.part.feature import ASKS, What, with_article
 
 PROGRAM = "QIF plan"
 _KINDS = ("Point", "Line", "Plane", "Circle", "Sphere", "Cylinder", "Cone")
@@ -40,13 +40,16 @@ _SORTS: Mapping[str, str] = {
     "PointProfile": refused.POINT_PROFILE, "LineProfile": refused.LINE_PROFILE,
     "SurfaceProfile": refused.SURFACE_PROFILE, "SurfaceProfileNonUniform": refused.SURFACE_PROFILE,
 }  # fmt: skip
-# elements that are read, or that leave the characteristic as it is
+# elements that are read, or that leave the characteristic or the datum as it is
 _READ = (
-    "ToleranceValue", "Tolerance", "DatumReferenceFrameId", "MaterialCondition", "ZoneShape", "StatisticalCharacteristic",
-    "Attributes", "DimensionType", "Name", "Description", "NonTolerance", "SeparateZone", "SizeCharacteristicDefinitionId",
+    "ToleranceValue", "Tolerance", "DatumReferenceFrameId", "MaterialCondition", "ZoneShape", "Attributes", "DimensionType",
+    "Name", "Description", "NonTolerance", "SeparateZone", "SizeCharacteristicDefinitionId",
     "UUID", "QPId", "CharacteristicDefinitionId", "TargetValue", "Direction", "AnalysisMode", "AnalysisVector", "Angle",
     "FeatureNominalIds", "FeatureNominalPairs", "CharacteristicDesignator", "CoordinateSystemId", "EntityInternalIds",
     "EntityExternalIds", "NotedIds", "Notes", "ScopeIds", "WorkInstructions", "KeyCharacteristic", "TargetValueCalculation",
+    "FeatureItemIds", "CharacteristicNominalId", "NotableEventIds", "MeasurementDeviceIds", "LocationOnDrawing",
+    "VirtualMeasurement", "Dimensionality", "ZoneOrientationVector",
+    "Datum", "DatumDefinitionId", "MaterialModifier", "ReferencedComponent",  # of datums
 )  # fmt: skip
 _NAMED: Mapping[str, str] = {
     "FreeState": refused.FREE_STATE,
@@ -56,6 +59,8 @@ _NAMED: Mapping[str, str] = {
     "SecondCompositeSegmentPositionDefinition": "is a composite tolerance of several segments, which is not read",
     "UnequallyDisposedZone": "has an unequally disposed zone, which is not modelled",
     "DirectionalZoneLimit": "has a zone of one direction, which is not read",
+    "StatisticalCharacteristic": "is a statistical tolerance, which is not modelled",
+    "SubstituteFeatureAlgorithm": "has an association of its own or of a datum (SubstituteFeatureAlgorithm), not read",
     "FeatureZoneIds": "is of a restricted zone of its feature, which is not read",
 }
 _PLAIN = ("", "NONE", "REGARDLESS", "NOT_APPLICABLE")  # material conditions that leave a tolerance or a datum as it is
@@ -151,14 +156,17 @@ class _Document:
             raise NotUnderstoodError(f"is a feature of kind {sort}, which is not read")
         if any(local(element) == "FromScan" and text(element) != "false" for element in item.iter()):
             raise NotUnderstoodError(refused.SCANNED)
+        if item.find("{*}DeterminationMode/{*}Set") is not None:
+            raise NotUnderstoodError("is set, not measured")
         if any(local(element) == "Constructed" for element in item.iter()):
             raise NotUnderstoodError("is constructed of other features, which is not read")
         nominal = item if local(item).endswith("FeatureNominal") else self._referred(item, "FeatureNominalId")
         definition = self._referred(nominal, "FeatureDefinitionId")
-        if nominal.find("{*}PointList") is not None:
+        if any(one.find("{*}PointList") is not None for one in (item, nominal)):
             raise NotUnderstoodError("has a list of points of its own (PointList), which is not read")
         found: Facts = {"name": name, "kind": sort.lower()}
-        if (algorithm := nominal.find("{*}SubstituteFeatureAlgorithm")) is not None:
+        said = (one.find("{*}SubstituteFeatureAlgorithm") for one in (item, nominal))
+        if (algorithm := next((each for each in said if each is not None), None)) is not None:
             if (word := whole_text(algorithm)) not in ASSOCIATIONS:
                 raise NotUnderstoodError(f"is to be associated by {word}, which is not read")
             found["association"] = ASSOCIATIONS[word]
@@ -240,12 +248,12 @@ class _Document:
         for kind in kinds:
             drawings.refuse_other_kind(what, kind)
         found: Facts = {"name": name, "what": what, "features": features}
-        _refuse_besides(definition)
-        _refuse_besides(nominal)
+        zone = definition.find("{*}ZoneShape")
+        for element in (definition, nominal, item, *([] if zone is None else zone)):
+            _refuse_besides(element)
         if (condition := child(definition, "MaterialCondition")) not in _PLAIN:
             raise NotUnderstoodError(f"holds at {condition.lower()} material condition, which is not modelled")
         usual = "DiametricalZone" if kinds[:1] and kinds[0] in ("circle", "cylinder", "cone", "line") else "PlanarZone"
-        zone = definition.find("{*}ZoneShape")
         shape = "" if zone is None or not len(zone) else local(zone[0])
         if shape and shape not in (("DiametricalZone", "SphericalZone") if what == "position" else (usual,)):
             raise NotUnderstoodError(f"has a tolerance zone of shape {shape}, which is not read")
@@ -269,8 +277,8 @@ class _Document:
         if sort not in WHATS:
             raise NotUnderstoodError(_SORTS.get(sort) or f"is a characteristic of kind {sort}, which is not read")
         mode = child(nominal, "AnalysisMode")
-        if sort == "DistanceBetween" and mode not in ("", "THREEDIMENSIONAL"):
-            raise NotUnderstoodError(f"is a distance in the analysis {mode}, which is not read")
+        if mode not in ("", "THREEDIMENSIONAL"):
+            raise NotUnderstoodError(f"is {with_article(WHATS[sort])} in the analysis {mode}, which is not read")
         return WHATS[sort]
 
     def _features(self, item: Element, what: What) -> list[str]:
@@ -291,7 +299,9 @@ class _Document:
                 raise NotUnderstoodError("has no tolerance above 0")
             return {"tolerance_mm": self.units.mm(width, pmi=True)}
         tolerance = definition.find("{*}Tolerance")
-        if tolerance is None:
+        if tolerance is None or child(
+            definition, "DimensionType"
+        ):  # exact by theory, set, or for reference: not toleranced
             return {}
         value = self.units.degrees if ASKS[what].limits == "angles" else self.units.mm
         low, high = tolerance.find("{*}MinValue"), tolerance.find("{*}MaxValue")
@@ -312,7 +322,10 @@ class _Document:
         datums = [each for each in listed if local(each) == "Datum"]
         for datum in sorted(datums, key=lambda one: order.get(whole_text(one.find("{*}Precedence")), len(order))):
             common = datum.find("{*}CompoundDatum")
-            parts = [datum] if common is None else [each for each in common if local(each) == "Datum"]
+            parts = [datum]
+            if common is not None:
+                _refuse_besides(common)
+                parts = [each for each in common if local(each) == "Datum"]
             found.append(BETWEEN.join(map(self._datum, parts)))
         return found
 
@@ -320,6 +333,7 @@ class _Document:
         simple = datum.find("{*}SimpleDatum")
         if simple is None:
             raise NotUnderstoodError("has a datum of a kind that is not read")
+        _refuse_besides(simple)
         if (condition := child(simple, "MaterialModifier")) not in _PLAIN:
             raise NotUnderstoodError(f"has a datum at {condition.lower()} material condition, which is not modelled")
         definition = self._referred(simple, "DatumDefinitionId")
@@ -337,7 +351,7 @@ class _Document:
 
 
 def _refuse_besides(element: Element) -> None:
-    """Refuse what a definition or a nominal of a characteristic says besides what is read of it."""
+    """Refuse what a characteristic, its definition, zone or nominal, or a datum says besides what is read of it."""
     for inner in element:
         name = local(inner)
         if name in _READ or whole_text(inner) == "false":

@@ -170,11 +170,16 @@ def test_what_is_not_understood_is_told_by_name(statements: str, name: str, why:
 
 @pytest.mark.parametrize("change", [
     "D(W)=ITERAT/FA(TOP)\n", "D(W)=DATSET/DAT(A),ZDIR,DAT(B),XDIR\n", "D(W)=ROTATE/ZAXIS,FA(TOP),XDIR\n", "D(W)=DATSET/MCS\n",
-    "D(W)=TRANS/XORIG,FA(NONE)\n",
+    "D(W)=TRANS/XORIG,FA(NONE)\n", "RECALL/D(W)\n",
 ])  # fmt: skip
 def test_a_frame_that_cannot_be_followed_ends_the_reading(change: str) -> None:
     with pytest.raises(CmmUqError, match=r"plate\.dmi line 15: a frame"):
         read(TOP, change, BORE)
+
+
+def test_a_tolerance_is_in_the_unit_of_its_line() -> None:
+    with pytest.raises(CmmUqError, match="the unit changes after features or tolerances were defined"):
+        read("T(X)=TOL/FLAT,0.1\n", "UNITS/INCH,ANGDEC\n", TOP)
 
 
 BELOW = TOP.replace("TOP", "LOW").replace("DAT(A)", "DAT(L)").replace(",30,", ",0,").replace(",30, ", ",0, ")

@@ -184,6 +184,12 @@ MADE = feature(6, "Point", "made", "<Location>4 5 6</Location><Normal>0 0 1</Nor
 NURBS = feature(6, "Plane", "bent", "<SubstituteFeatureAlgorithm>NURBS</SubstituteFeatureAlgorithm>")
 MAXIMUM = "<MaterialCondition>MAXIMUM</MaterialCondition>"
 PROJECTED = "<ProjectedToleranceZoneValue>12</ProjectedToleranceZoneValue>"
+STATISTICAL = "<StatisticalCharacteristic>true</StatisticalCharacteristic>"
+ELONGATED = "<ZoneShape><DiametricalZone><ElongatedZone>true</ElongatedZone></DiametricalZone></ZoneShape>"
+ASSOCIATED = """<SubstituteFeatureAlgorithm><SubstituteFeatureAlgorithmEnum>{}</SubstituteFeatureAlgorithmEnum>
+</SubstituteFeatureAlgorithm>"""
+*_OF, ITEM = characteristic(7, "Diameter", "8", [2], tolerance(9, 10, limit=True))
+OF_ITS_OWN = (*_OF, ITEM.replace("<CharacteristicNom", ASSOCIATED.format("MAXINSCRIBED") + "<CharacteristicNom"))
 SCAN = feature(8, "Circle", "scan", "<Location>4 5 6</Location><Normal>0 0 1</Normal>", HOLE,
                "<Constructed><FromScan/></Constructed>")  # fmt: skip
 
@@ -212,6 +218,14 @@ SCAN = feature(8, "Circle", "scan", "<Location>4 5 6</Location><Normal>0 0 1</No
      "has 'wide' where a number"),
     ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 4, "<ZoneShape><NonDiametricalZone/></ZoneShape>")), "8",
      "zone of shape NonDiametricalZone"),
+    ("Asked", characteristic(7, "AngleBetween", "8", [0, 1], tolerance(-1, 1),
+                             "<AnalysisMode>TWODIMENSIONAL</AnalysisMode><TargetValue>0</TargetValue>"), "8",
+     "is an angle in the analysis TWODIMENSIONAL"),
+    ("Asked", characteristic(7, "Flatness", "8", [0], zone(0.5, None, STATISTICAL)), "8", "is a statistical tolerance"),
+    ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 4, ELONGATED)), "8", "says ElongatedZone, which is"),
+    ("Asked", OF_ITS_OWN, "8", "has an association of its own"),
+    ("Features", feature(8, "Plane", "set", "<Location>1 2 3</Location><Normal>0 0 1</Normal>", more="<Set/>"), "set",
+     "is set, not measured"),
     ("Asked", characteristic(7, "Position", "8", [2], zone(0.5, 99)), "8", "DatumReferenceFrameId to nothing that is there"),
 ])  # fmt: skip
 def test_what_is_not_understood_is_told_by_name(kind: str, item: tuple[str, str, str], name: str, why: str) -> None:
@@ -228,6 +242,34 @@ def test_a_datum_at_maximum_material_condition_is_not_understood() -> None:
     found = read(modifier="MAXIMUM")
     assert [one.name for one in found.unknown] == ["4"]
     assert "has a datum at maximum material condition" in found.unknown[0].why
+
+
+@pytest.mark.parametrize("more", [
+    "<DatumTranslation><DatumTranslationAllowed>true</DatumTranslationAllowed></DatumTranslation>",
+    "<DegreesOfFreedom><DegreeOfFreedom>Z</DegreeOfFreedom></DegreesOfFreedom>", "<ReducedDatum>PT</ReducedDatum>",
+    "<ConstrainOrientation>true</ConstrainOrientation>", "<DistanceVariable>true</DistanceVariable>",
+])  # fmt: skip
+def test_what_alters_a_datum_is_not_understood(more: str) -> None:
+    """A datum that fixes less, or something else, than its feature; the same switched off is none."""
+    found = read(modifier=f"NONE</MaterialModifier>{more}<MaterialModifier>NONE")
+    assert [one.name for one in found.unknown] == ["4"]
+    assert f"says {more[1:].partition('>')[0]}, which is not read" in found.unknown[0].why
+    off = read(modifier=f"NONE</MaterialModifier>{more.replace('true', 'false')}<MaterialModifier>NONE")
+    assert bool(off.unknown) != ("true" in more)
+
+
+def test_an_exact_or_auxiliary_dimension_is_not_toleranced() -> None:
+    said = tolerance(9, 10, limit=True) + "<DimensionType>{}</DimensionType>"
+    for sort in ("BASIC_OR_TED", "REFERENCE_OR_AUXILIARY"):
+        found = read(characteristic(7, "Diameter", "8", [2], said.format(sort)), kind="Asked")
+        assert found.characteristics[-1] == {"name": "8", "what": "size", "features": ["hole"]}
+
+
+def test_the_association_of_an_item_goes_before_that_of_its_nominal() -> None:
+    nominal = "<Location>4 5 6</Location><Normal>0 0 1</Normal>"
+    definition, of, item = feature(8, "Circle", "own", nominal + ASSOCIATED.format("LEASTSQUARES"), HOLE)
+    item = item.replace("<DeterminationMode>", ASSOCIATED.format("MAXINSCRIBED") + "<DeterminationMode>")
+    assert read((definition, of, item), kind="Features").features[-1]["association"] == "maximum_inscribed"
 
 
 def test_without_units_there_are_no_lengths() -> None:
