@@ -349,9 +349,8 @@ SCANNED_PLANES = Kind(
 )
 _TRACKED = f"{_HERE}.optical.tracked"
 TRACKED_POINTS = Kind(
-    "tracked_points", ReferencedFacts, f"{_TRACKED}:TrackedPoints", f"{_TRACKED}:SCREENING", page=f"{_TRACKED}:PAGE",
-    begin=f"{_TRACKED}:BEGIN",
-    instead="Choose poses in which every joint moves far; cmm-uq report says by name what they leave open",
+    "tracked_points", ReferencedFacts, f"{_TRACKED}:TrackedPoints", f"{_TRACKED}:SCREENING",
+    f"{_HERE}.optical.poses:PLANNING", f"{_TRACKED}:PAGE", f"{_TRACKED}:BEGIN",
 )  # fmt: skip
 
 

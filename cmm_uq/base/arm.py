@@ -40,6 +40,7 @@ class ArmPose:
     axes: Floats
     origins: Floats  # (n, j, 5, 3) a point that each goes through, mm
     flange: Floats  # (n, 3, 3) attitude of the last frame, in which the tool's offset is given
+    path: Floats  # (n, 5 j + 2, 3) where each motion begins, from the base outwards, then flange and tool, mm
 
     @cached_property
     def jacobian(self) -> Floats:
@@ -125,7 +126,7 @@ class Arm(Machine):
         frame, origin = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
         axes, origins = np.empty((2, n, j, 5, 3))
         for i in range(j):
-            for name in _MODIFIED if self.modified else _STANDARD:
+            for name in self._order:
                 along, value = _ALONG[name], values[:, i, name, None]
                 axes[:, i, name], origins[:, i, name] = frame[:, :, along], origin
                 if not _TURNS[name]:
@@ -136,4 +137,10 @@ class Arm(Machine):
                 turned = cosine * one + sine * other, cosine * other - sine * one
                 frame[:, :, (along + 1) % 3], frame[:, :, (along + 2) % 3] = turned
         offset = self.tool_mm + change[:, 5 * j :] + (0.0 if tips is None else tips)
-        return ArmPose(origin + np.einsum("nij,nj->ni", frame, offset), axes, origins, frame)
+        tool = origin + np.einsum("nij,nj->ni", frame, offset)
+        ends = (origins[:, :, self._order].reshape(n, -1, 3), origin[:, None], tool[:, None])
+        return ArmPose(tool, axes, origins, frame, np.concatenate(ends, axis=1))
+
+    @property
+    def _order(self) -> tuple[int, ...]:
+        return _MODIFIED if self.modified else _STANDARD

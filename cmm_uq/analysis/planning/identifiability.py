@@ -10,7 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from cmm_uq.analysis.planning.candidates import FAINT, certified, cosines, gram, imitators, left_of, scales, visible
+from cmm_uq.analysis.planning.candidates import (
+    FAINT,
+    certified,
+    cosines,
+    gram,
+    imitators,
+    left_of,
+    scales,
+    shared,
+    visible,
+)
 from cmm_uq.analysis.planning.set_up import SetUp, repeat_points
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, uncorrelated, white_noise
 from cmm_uq.base.points import Floats
@@ -147,6 +157,24 @@ def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsCompa
         rows.append(RepeatsRow(repeats, readings, minutes(n, readings), now, more, minutes(n + 1, more), later))
     unknowns = tuple(unknown for unknown in model.unknowns if not unknown.known)
     return RepeatsComparison(unknowns, n, tuple(rows)) if np.any(np.isfinite(rows[0].u)) else None
+
+
+def predicted(setting: Setting, placings: Sequence[SetUp]) -> Floats | None:
+    """(t, 3) u of where the machine is at further set-ups, by what set-ups tell and physics allows, mm; beside their noise.
+
+    ``None`` for a kind that names no further set-ups.
+    """
+    if setting.planning.held_out is None:
+        return None
+    points = setting.joined([*placings, *setting.planning.held_out(setting)])
+    model = setting.model(points)
+    known, at = shared(model, setting.noise), model.artefact.points
+    effects = [float(i < len(known.unknowns) and known.unknowns[i].key[0] != ARTEFACT) for i in range(len(known.prior))]
+    covariance = linalg.pinvh(known.each[: len(placings)].sum(axis=0) + known.prior + np.diag(effects))
+    linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
+    rows = np.hstack([linear.design * scales(linear.unknowns), linear.freedoms.dense()])
+    further = rows[(model.artefact.measurement > len(placings)) & (model.artefact.repeat == at.repeat.min())]
+    return np.asarray(np.sqrt(np.einsum("mi,ij,mj->m", further, covariance, further)).reshape(-1, 3))
 
 
 Pair = tuple[str, str, float]  # two effects and the absolute cosine between them

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, join
+from cmm_uq.base.arm import Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
@@ -48,6 +49,7 @@ class Volume:
         box, margin = np.empty((3, 2)), plan.margin_mm
         for i, axis in enumerate(AXES):
             low, high = machine.travel_mm[i]
+            box[i] = -np.inf, np.inf
             if axis in plan.volume_mm:
                 box[i] = plan.volume_mm[axis]
                 if box[i, 0] < low - _ROUNDING or box[i, 1] > high + _ROUNDING:  # false where the travel is not known
@@ -55,6 +57,8 @@ class Volume:
                         f"{axis} = [{box[i, 0]:g}, {box[i, 1]:g}] mm goes beyond the travel of {low:g} to {high:g} mm",
                         where="job.toml [plan] volume_mm", fix="Keep inside the travel, or mend [machine] travel_mm",
                     )  # fmt: skip
+            elif isinstance(machine, Arm):  # whose joints have travels
+                continue
             elif recorded is not None and not np.all(np.isfinite(machine.travel_mm[i])):
                 box[i] = recorded[:, i].min() - margin, recorded[:, i].max() + margin
             else:
@@ -276,6 +280,12 @@ class Planning:
     sought: bool = False  # whether it is sizes of the artefact that are sought, so that no effect need be named
     # (setting, points, where): what set-ups leave open, in words, of a kind that names no effects
     free: Callable[[Setting, Points, str], tuple[Text, ...]] | None = None
+    observe: Observe | None = None  # in place of the kind's, where a set-up is a part of a measurement of the kind
+    # (recorded, planned): planned points as the kind numbers them
+    numbered: Callable[[Points, Points], Points] | None = None
+    # further set-ups, at which a plan says how well it predicts
+    held_out: Callable[[Setting], tuple[SetUp, ...]] | None = None
+    notes: Callable[[Setting], tuple[Text, ...]] | None = None  # what of set-ups is not looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,12 +302,13 @@ class Setting:
     stated: float | None = None  # the same as the job states it; None where it does not
     noise: PlannedNoise | None = None  # with its set-up offsets; None where it is taken as white
     circumstances: Circumstances | None = None  # what is stated to be in doubt of the artefact
+    recorded: Points | None = None  # what there is already
 
     @classmethod
     def of(cls, job: Job, kind: Kind) -> Setting:
         facts, plan = job.facts, job.facts.plan
         planning = kind.needs("plan", Planning, "planned")
-        observe = kind.observing("planned") if planning.free is None else None
+        observe = None if planning.free is not None else planning.observe or kind.observing("planned")
         if not (facts.model.effects or planning.sought) and planning.free is None:
             raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
                              fix="Name the error factors that the measurement shall determine")  # fmt: skip
@@ -307,6 +318,7 @@ class Setting:
             facts.artefact, observe, planning, plan, Volume.of(job.points.machine, plan, recorded),
             effects(facts.model.effects, where="job.toml [model] effects"), noise.coordinate,
             None if stated is None else stated * MICROMETRE, noise, job.circumstances,
+            job.points if len(job.points) else None,
         )  # fmt: skip
 
     @property

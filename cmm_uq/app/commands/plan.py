@@ -63,7 +63,9 @@ def write_plan(
 def recording_to_be(plan: MeasurementPlan) -> bytes:
     """The placings that are still to be measured, as the CSV of a recording at nominal coordinates."""
     each = {name: getattr(plan.setting.plan, name) for name in ("seconds_per_point", "minutes_per_placing")}
-    return to_fill_in(join(plan.to_measure, first=plan.first, **each))
+    planned, number = join(plan.to_measure, first=plan.first, **each), plan.setting.planning.numbered
+    recorded = plan.start.points if plan.measured else plan.job.points
+    return to_fill_in(planned if number is None else number(recorded, planned))
 
 
 SCHEMA = "cmm-uq/plan/1"
@@ -108,6 +110,7 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
         "indistinguishable": [{"effects": [a, b], "cosine": cosine} for a, b, cosine in found.alike],
         "absorbed": [{"effect": name, "as": list(others)} for name, others in found.absorbed],
         "unseen": list(found.unseen),
+        **({} if outlook.predicted is None else {"held_out": words.held_out(outlook.predicted)}),
         "smallest": [
             {"effect": power.effect, "parameter": power.parameter, "unit": power.unit, "detected": power.detectable,
              "named": power.identifiable}

@@ -11,6 +11,7 @@ from cmm_uq.analysis.diagnosis.power import POWER, SIZES
 from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
 from cmm_uq.app.commands.planning import RECORDED, MeasurementPlan
 from cmm_uq.base.messages import DASH, NOTHING, Message, Text, Verbatim, after, commas, listed, number, plural, say
+from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import (
     Block,
@@ -226,7 +227,9 @@ def plan_document(plan: MeasurementPlan) -> Document:
         warnings.append(say("Not determined by these set-ups: {free}.", free=free))
     marks = ((Verbatim("✓" if each.met else "✗"), each.what) for each in plan.conditions)
     conditions = (Paragraph(say("{mark} {what}", mark=mark, what=what)) for mark, what in marks)
-    pictures = placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first)
+    pictures = (
+        () if plan.setting.planning.numbered else placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first)
+    )
     return working_page(
         facts, say("Measurement plan"), artefact,
         particulars=(
@@ -275,9 +278,10 @@ def _placings(plan: MeasurementPlan) -> Table | None:
         Column(say("No.")), say("Set up"), say("From → to, scale readings in mm"), Column(say("Points")),
         Column(say("Time"), unit("min")),
     )  # fmt: skip
-    notes = [say("Every point {repeats} times; points count repeats.", repeats=plan.setting.plan.repeats)]
+    notes: list[Text] = [say("Every point {repeats} times; points count repeats.", repeats=plan.setting.plan.repeats)]
     if plan.measured:
         notes.append(say("{measured} measurements are recorded already.", measured=plan.measured))
+    notes += plan.setting.planning.notes(plan.setting) if plan.setting.planning.notes else ()
     return table(say("Set-ups in the order of measurement"), heads, placing_rows(plan), *notes)
 
 
@@ -309,10 +313,23 @@ def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
         *(Paragraph(say("If it acts, it will be taken for what the job names: {text}.", text=text))
           for text in absorbed(found)),
     ]  # fmt: skip
+    if plan.outlook.predicted is not None:
+        figures = held_out(plan.outlook.predicted)
+        blocks.append(Paragraph(say(
+            "At {count} further poses the place of the point is expected within u = {rms} µm along each axis (root mean "
+            "square), {largest} µm at most, beside the noise of a reading.",
+            count=figures["poses"], rms=significant(figures["u_rms_um"]), largest=significant(figures["u_largest_um"]),
+        )))  # fmt: skip
     if found.unseen:
         effects = commas(effect_title(name) for name in found.unseen)
         blocks.append(Paragraph(say("Nothing would show of: {effects}.", effects=effects), tone="note"))
     return tuple(blocks)
+
+
+def held_out(u: Floats) -> dict[str, float]:
+    """Of u (t, 3), mm, at further poses."""
+    found = u / MICROMETRE
+    return {"poses": len(u), "u_rms_um": float(np.sqrt(np.mean(found**2))), "u_largest_um": float(found.max())}
 
 
 def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
@@ -330,10 +347,13 @@ def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
         hidden_before=len(start.unseen) + len(start.absorbed), hidden_after=len(better.unseen) + len(better.absorbed),
     )  # fmt: skip
     blocks: list[Block | None] = [Paragraph(text)]
+    compared = [(named(p.unknown), p.u, q.u, unit_of(p.unknown), expected(p, p.u), expected(q, q.u))
+                for p, q in zip(start.parameters, better.parameters, strict=True)]  # fmt: skip
+    if plan.start.predicted is not None and plan.better.predicted is not None:
+        u, v = (held_out(each)["u_rms_um"] for each in (plan.start.predicted, plan.better.predicted))
+        compared.append((say("Place at further poses"), u, v, unit("µm"), significant(u), significant(v)))
     blocks += _beside(
-        [(named(p.unknown), p.u, q.u, unit_of(p.unknown), expected(p, p.u), expected(q, q.u))
-         for p, q in zip(start.parameters, better.parameters, strict=True)],
-        both, say("Expected standard uncertainty"),
+        compared, both, say("Expected standard uncertainty"),
     )  # fmt: skip
     if plan.start.powers and plan.better.powers:
         sizes = (

@@ -22,7 +22,7 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.overflow import refusing_overflow
-from cmm_uq.base.points import Points
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.effect import Effect
@@ -92,6 +92,7 @@ class Outlook:
     """What some placings tell; ``points`` are the same as one recording.
 
     identifiability : of the effects named; ``None`` for a kind that names none.
+    predicted : (t, 3) u of the machine's place at further set-ups, mm; ``None`` for a kind that has none.
     powers : how large each effect that the job does not name must be for the diagnosis to find it; empty when not asked for,
         and for placings that give way to others by a criterion which does not part effects.
     """
@@ -100,6 +101,7 @@ class Outlook:
     points: Points
     identifiability: design.Identifiability | None
     powers: tuple[Power, ...]
+    predicted: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +259,7 @@ def _outlook(
         ):
             predicted.append(each)
             tell(len(predicted), len(rivals))
-    return Outlook(placings, points, found, tuple(predicted))
+    return Outlook(placings, points, found, tuple(predicted), design.predicted(setting, placings))
 
 
 def _searched(

@@ -221,13 +221,18 @@ PAGE = Page(sections, results)
 _POSES = 60
 
 
+def readings_within(limits: Floats, count: int, seed: int) -> Floats:
+    """(count, j) readings, evenly in each range of (j, 2) (Latin hypercube: McKay et al., Technometrics 21 (1979) 239)."""
+    low, high = limits.T
+    rank = np.argsort(np.random.default_rng(seed).random((count, len(low))), axis=0)
+    return np.asarray(np.round(low + (high - low) * (rank + 0.5) / count, 3))
+
+
 def poses(machine: Machine) -> Points:
     """Poses within the joints' travels, evenly in each, and where a tracker two metres away sees the tool."""
     arm = cast("Arm", machine)
-    random, n = np.random.default_rng(1), _POSES
-    low, high = np.array([arm.travel(joint) for joint in arm.joints]).T
-    q = low + (high - low) * (np.argsort(random.random((n, len(low))), axis=0) + 0.5) / n
-    q = np.round(q, 3)
+    n = _POSES
+    q = readings_within(np.array([arm.travel(joint) for joint in arm.joints]), n, seed=1)
     columns = dict(zip(arm.columns_of_joints, q.T, strict=True))
     xyz = arm.posed(columns).tool
     seen = xyz @ np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]) + [2000.0, -500.0, 300.0]
@@ -253,6 +258,7 @@ BEGIN = Beginning(
     title="Robot measured by a laser tracker",
     numbering="One measurement is one station of the tracker; its points are the poses.",
     artefact={"name": "Laser tracker", "u_um": "10 + 5·L/1000"}, noise_um=40.0, effects=_DETERMINED, points=poses,
+    plan={"criterion": "D", "number": 50, "repeats": 1, "placing_um": 0.0, "minutes_per_placing": 0.5},
     machine={
         "name": "Robot", "arm": {"tool_mm": [30.0, 0.0, 120.0]},
         "joint": [

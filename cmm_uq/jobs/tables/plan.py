@@ -20,7 +20,9 @@ from cmm_uq.base.files.table import (
     Length,
     Names,
     Pair,
+    Position,
     Range,
+    Triple,
     Uncertainty,
     Unit,
     at_least,
@@ -63,6 +65,41 @@ class FixtureFacts(JobTable):
             yield f"heights_mm = {self.heights_mm}: the first number must be the lower one"
 
 
+class ObstacleFacts(JobTable):
+    """One ``[[plan.poses.obstacle]]``: a box in the frame of the machine, of an arm that of its base."""
+
+    low_mm: Triple = required("Its lowest corner, [x, y, z].")
+    high_mm: Triple = required("Its highest corner.")
+    name: str = key("", "What stands there.")
+
+    def problems(self) -> Iterator[str]:
+        if any(low >= high for low, high in zip(self.low_mm, self.high_mm, strict=True)):
+            yield f"obstacle {self.low_mm} to {self.high_mm} has no inside: give low_mm below high_mm along x, y and z"
+
+
+class PosesFacts(JobTable):
+    """``[plan.poses]``: what stands in the way of an arm, and of the beam of a tracker."""
+
+    obstacle: Annotated[list[ObstacleFacts], Field(max_length=LISTED.most)] = []
+    """Boxes that no link, no joint and no tool may enter, and that hide the reflector."""
+    floor_mm: Position | None = key(None, "Height along z of the base's frame below which nothing that moves goes.")
+    clearance_mm: Annotated[float, Field(ge=0, le=1e4)] = 50.0
+    """How far links, which are taken as lines, keep from floor and boxes, and a beam from links."""
+    station_mm: Triple | None = key(
+        None, "Where the tracker stands in the machine's frame, to which the reflector is seen."
+    )
+    opening: Direction | None = None
+    """Direction in the last frame into which the reflector opens, where nobody turns it towards the tracker."""
+    acceptance_deg: Annotated[float, Field(gt=0, le=180)] = 30.0
+    """Largest angle between that direction and the beam."""
+
+    def problems(self) -> Iterator[str]:
+        if self.opening is not None and self.station_mm is None:
+            yield "opening needs a tracker to open to: give station_mm = [x, y, z]"
+        if self.opening is not None and hypot(*self.opening) < _SHORTEST:
+            yield f"opening = {self.opening} is no direction"
+
+
 class PlanFacts(JobTable):
     """``[plan]``.
 
@@ -76,6 +113,7 @@ class PlanFacts(JobTable):
     """Scale readings that points may have; the machine's travel, else the recorded range."""
     margin_mm: Annotated[float, Field(ge=0, le=1e6)] = key(10.0, "Kept free at each end of that range.")
     fixtures: FixtureFacts = key(FixtureFacts(), "How the artefact may stand.")
+    poses: PosesFacts = key(PosesFacts(), "What stands in the way of an arm, and of the beam of a tracker.")
     length_mm: Length | None = key(None, "Length of an artefact that is not certified, roughly.")
     lengths_mm: Annotated[list[Length], Field(max_length=LISTED.most)] = []
     """Distances of a gauge's faces from the first, or lengths of blocks."""

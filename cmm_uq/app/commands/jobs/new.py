@@ -230,7 +230,8 @@ def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     if kind.plan is None:
         raise kind.refused("planned")
     tables = _tables(kind, begin, given, id, origin=MEASURED)
-    length = {} if "length_mm" in tables["artefact"] or "pitch_mm" in begin.plan else {"length_mm": 600.0}
+    sized = "length_mm" in tables["artefact"] or {"pitch_mm", "number"} & set(begin.plan)
+    length = {} if sized else {"length_mm": 600.0}
     tables["plan"] = {**length, **begin.plan, **tables.get("plan", {})}
     return job_files(kind.name, tables, {}, example_keys(tables, given), begin=replace(begin, command=PLAN))
 
