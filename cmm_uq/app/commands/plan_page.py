@@ -315,11 +315,14 @@ def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
     ]  # fmt: skip
     if plan.outlook.predicted is not None:
         figures = held_out(plan.outlook.predicted)
-        blocks.append(Paragraph(say(
+        text = say(
             "At {count} further poses the place of the point is expected within u = {rms} µm along each axis (root mean "
             "square), {largest} µm at most, beside the noise of a reading.",
-            count=figures["poses"], rms=significant(figures["u_rms_um"]), largest=significant(figures["u_largest_um"]),
-        )))  # fmt: skip
+            count=figures["poses"],
+            rms=significant(figures["u_rms_um"]),
+            largest=significant(figures["u_largest_um"]),
+        )
+        blocks.append(Paragraph(text))
     if found.unseen:
         effects = commas(effect_title(name) for name in found.unseen)
         blocks.append(Paragraph(say("Nothing would show of: {effects}.", effects=effects), tone="note"))
@@ -347,8 +350,10 @@ def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
         hidden_before=len(start.unseen) + len(start.absorbed), hidden_after=len(better.unseen) + len(better.absorbed),
     )  # fmt: skip
     blocks: list[Block | None] = [Paragraph(text)]
-    compared = [(named(p.unknown), p.u, q.u, unit_of(p.unknown), expected(p, p.u), expected(q, q.u))
-                for p, q in zip(start.parameters, better.parameters, strict=True)]  # fmt: skip
+    compared = [
+        (named(p.unknown), p.u, q.u, unit_of(p.unknown), expected(p, p.u), expected(q, q.u))
+        for p, q in zip(start.parameters, better.parameters, strict=True)
+    ]
     if plan.start.predicted is not None and plan.better.predicted is not None:
         u, v = (held_out(each)["u_rms_um"] for each in (plan.start.predicted, plan.better.predicted))
         compared.append((say("Place at further poses"), u, v, unit("µm"), significant(u), significant(v)))

@@ -102,8 +102,11 @@ def even(setting: Setting, count: int, seed: int, *, farther: float = 1.0) -> tu
     readings = np.concatenate(found or [limits[:0].T])[:count]
     if count and not len(readings):
         said, fix = _WHY[int(np.argmax(against))]
-        raise CmmUqError(f"no pose is possible: {against.max()} of {drawn} within the travels {said}",
-                         where="job.toml [plan]", fix=fix)  # fmt: skip
+        raise CmmUqError(
+            f"no pose is possible: {against.max()} of {drawn} within the travels {said}",
+            where="job.toml [plan]",
+            fix=fix,
+        )
     points, n = _points(setting, readings, random.choice([-1.0, 1.0], readings.shape)), setting.plan.repeats
     each = (points.select(np.full(n, row)) for row in range(len(points)))
     words = (in_a_row(signed(value, ".1f") for value in row) for row in readings.tolist())
@@ -217,6 +220,11 @@ def notes(setting: Setting) -> tuple[Text, ...]:
 
 
 PLANNING = Planning(
-    {"even poses": lambda setting: even(setting, setting.plan.number or POSES, 3)}, candidates, shared=True,
-    observe=PlannedPoses, numbered=numbered, held_out=lambda setting: even(setting, HELD_OUT, 4), notes=notes,
-)  # fmt: skip
+    {"even poses": lambda setting: even(setting, setting.plan.number or POSES, 3)},
+    candidates,
+    shared=True,
+    observe=PlannedPoses,
+    numbered=numbered,
+    held_out=lambda setting: even(setting, HELD_OUT, 4),
+    notes=notes,
+)
