@@ -110,7 +110,7 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
         "indistinguishable": [{"effects": [a, b], "cosine": cosine} for a, b, cosine in found.alike],
         "absorbed": [{"effect": name, "as": list(others)} for name, others in found.absorbed],
         "unseen": list(found.unseen),
-        **({} if outlook.predicted is None else {"held_out": words.held_out(outlook.predicted)}),
+        **({} if outlook.predicted is None else {"held_out": outlook.held_out}),
         "smallest": [
             {"effect": power.effect, "parameter": power.parameter, "unit": power.unit, "detected": power.detectable,
              "named": power.identifiable}

@@ -11,7 +11,6 @@ from cmm_uq.analysis.diagnosis.power import POWER, SIZES
 from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
 from cmm_uq.app.commands.planning import RECORDED, MeasurementPlan
 from cmm_uq.base.messages import DASH, NOTHING, Message, Text, Verbatim, after, commas, listed, number, plural, say
-from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import (
     Block,
@@ -313,26 +312,20 @@ def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
         *(Paragraph(say("If it acts, it will be taken for what the job names: {text}.", text=text))
           for text in absorbed(found)),
     ]  # fmt: skip
-    if plan.outlook.predicted is not None:
-        figures = held_out(plan.outlook.predicted)
+    if (further := plan.outlook.held_out) is not None:
+        u, largest = (significant(further[name]) for name in ("u_rms_um", "u_largest_um"))
         text = say(
             "At {count} further poses the place of the point is expected within u = {rms} µm along each axis (root mean "
             "square), {largest} µm at most, beside the noise of a reading.",
-            count=figures["poses"],
-            rms=significant(figures["u_rms_um"]),
-            largest=significant(figures["u_largest_um"]),
+            count=further["poses"],
+            rms=u,
+            largest=largest,
         )
         blocks.append(Paragraph(text))
     if found.unseen:
         effects = commas(effect_title(name) for name in found.unseen)
         blocks.append(Paragraph(say("Nothing would show of: {effects}.", effects=effects), tone="note"))
     return tuple(blocks)
-
-
-def held_out(u: Floats) -> dict[str, float]:
-    """Of u (t, 3), mm, at further poses."""
-    found = u / MICROMETRE
-    return {"poses": len(u), "u_rms_um": float(np.sqrt(np.mean(found**2))), "u_largest_um": float(found.max())}
 
 
 def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
@@ -354,8 +347,8 @@ def _gain(plan: MeasurementPlan) -> tuple[Block | None, ...]:
         (named(p.unknown), p.u, q.u, unit_of(p.unknown), expected(p, p.u), expected(q, q.u))
         for p, q in zip(start.parameters, better.parameters, strict=True)
     ]
-    if plan.start.predicted is not None and plan.better.predicted is not None:
-        u, v = (held_out(each)["u_rms_um"] for each in (plan.start.predicted, plan.better.predicted))
+    if plan.start.held_out and plan.better.held_out:
+        u, v = (each.held_out["u_rms_um"] for each in (plan.start, plan.better) if each.held_out)
         compared.append((say("Place at further poses"), u, v, unit("µm"), significant(u), significant(v)))
     blocks += _beside(
         compared, both, say("Expected standard uncertainty"),

@@ -103,6 +103,14 @@ class Outlook:
     powers: tuple[Power, ...]
     predicted: Floats | None = None
 
+    @property
+    def held_out(self) -> dict[str, float] | None:
+        """For results.json, of u at further set-ups."""
+        if self.predicted is None:
+            return None
+        u = self.predicted / MICROMETRE
+        return {"poses": len(u), "u_rms_um": float(np.sqrt(np.mean(u**2))), "u_largest_um": float(u.max())}
+
 
 @dataclass(frozen=True, eq=False)
 class MeasurementPlan:
