@@ -10,6 +10,9 @@ From the base to the flange the motions of each joint are
 A revolute joint adds its reading to θ, a prismatic one to d. Either way a chain is a sequence of turns about, and shifts
 along, axes that the motions before them carry: a turn moves the tool by u × (tool − origin), a shift by u. That is the exact
 derivative with respect to every parameter, whatever the convention.
+
+An arm may be stated by its screw axes at home too (Brockett 1984; Lynch, Park, Modern Robotics (2017), 4.1), which become such
+rows without approximation.
 """
 
 from __future__ import annotations
@@ -63,6 +66,10 @@ class Arm(Machine):
     sense: Floats = field(default_factory=lambda: np.zeros(0))  # (j,) +1, or −1 of a reading that counts the other way
     tool_mm: Floats = field(default_factory=lambda: np.zeros(3))
     modified: bool = False
+    base: Floats = field(
+        default_factory=lambda: np.eye(4)
+    )  # frame in which the first row begins, in that of the base, mm
+    by_screws: bool = False  # whether it is stated by screw axes
     # (3,) against gravity, in the frame of the base
     up: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     limits: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # (j, 2) lowest and highest readings, ° or mm
@@ -123,7 +130,7 @@ class Arm(Machine):
         values[:, np.arange(j), np.where(self.revolute, THETA, D)] += (
             self.sense * q * np.where(self.revolute, np.pi / 180, 1.0)
         )
-        frame, origin = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
+        frame, origin = np.tile(self.base[:3, :3], (n, 1, 1)), np.tile(self.base[:3, 3], (n, 1))
         axes, origins = np.empty((2, n, j, 5, 3))
         for i in range(j):
             for name in self._order:
@@ -144,3 +151,54 @@ class Arm(Machine):
     @property
     def _order(self) -> tuple[int, ...]:
         return _MODIFIED if self.modified else _STANDARD
+
+
+_PARALLEL = np.cos(np.radians(5.0))  # from which on the common normal of two axes says little of where it is
+
+
+def rows_of_screws(directions: Floats, through: Floats, revolute: NDArray[np.bool_], home: Floats) -> dict[str, Floats]:
+    """``base``, ``rows`` and ``tool_mm`` of a product of exponentials e^ξ₁q₁ … e^ξⱼqⱼ·M, equal to it at all readings.
+
+    ``directions``, ``through``: (j, 3) unit vectors, and points of the axes at home, mm, in the frame of the base; ``home``:
+    (4, 4) M, the last frame there. Each row carries a frame along one axis into a frame along the next: by their
+    common normal, or by Hayati's β in place of d where they are nearly parallel.
+    """
+    z = directions[0]
+    x = np.eye(3)[0] - z[0] * z if abs(z[0]) < 1 - 1e-9 else np.eye(3)[1]
+    frame, rows = np.eye(4), np.zeros((len(directions), 5))
+    x = x / np.linalg.norm(x)
+    frame[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    frame[:3, 3] = (through[0] - (through[0] @ z) * z) if revolute[0] else 0.0
+    base = frame.copy()
+    for i, (direction, point) in enumerate(zip(directions[1:], through[1:], strict=True)):
+        axis = frame[:3, :3].T @ direction
+        at = frame[:3, :3].T @ (point - frame[:3, 3]) if revolute[i + 1] else np.zeros(3)  # a shift has no place
+        rows[i] = _to_parallel(axis, at) if abs(axis[2]) > _PARALLEL else _to_crossing(axis, at)
+        frame = frame @ _motion(rows[i])
+    last = np.linalg.inv(frame) @ home
+    rows[-1, ALPHA] = np.arcsin(np.clip(last[2, 1], -1.0, 1.0))  # Rz(θ) Rx(α) Ry(β)
+    rows[-1, THETA], rows[-1, BETA] = np.arctan2(-last[0, 1], last[1, 1]), np.arctan2(-last[2, 0], last[2, 2])
+    return {"base": base, "rows": rows, "tool_mm": last[:3, :3].T @ last[:3, 3]}
+
+
+def _to_crossing(axis: Floats, at: Floats) -> Floats:
+    across = np.hypot(axis[0], axis[1])
+    along = at - (at[:2] @ axis[:2]) / across**2 * axis  # foot of the common normal
+    normal = np.array([-axis[1], axis[0]]) / across
+    return np.array([normal @ at[:2], np.arctan2(across, axis[2]), along[2], np.arctan2(normal[1], normal[0]), 0.0])
+
+
+def _to_parallel(axis: Floats, at: Floats) -> Floats:
+    foot = (at - at[2] / axis[2] * axis)[:2]
+    a, theta = float(np.hypot(*foot)), float(np.arctan2(foot[1], foot[0]))
+    cosine, sine = np.cos(theta), np.sin(theta)
+    x, y = cosine * axis[0] + sine * axis[1], cosine * axis[1] - sine * axis[0]
+    return np.array([a, np.arctan2(-y, axis[2]), 0.0, theta, np.arcsin(np.clip(x, -1.0, 1.0))])
+
+
+def _motion(row: Floats) -> Floats:
+    """(4, 4) of a row at reading 0."""
+    pose = Arm(rows=row[None], revolute=np.ones(1, dtype=bool), sense=np.ones(1)).at(np.zeros((1, 1)))
+    found = np.eye(4)
+    found[:3, :3], found[:3, 3] = pose.flange[0], pose.tool[0]
+    return found

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from cmm_uq.base.arm import Arm
+from cmm_uq.base.arm import Arm, rows_of_screws
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.rotary import Turntable
 from cmm_uq.jobs.columns import COORDINATES, REQUIRED
 from cmm_uq.jobs.tables.machine import MachineFacts, stated_axes
+from cmm_uq.maths.geometry.feature import nearest_rotations
 
 _FINEST = 9  # decimals of a number that is looked at as printed
 _ROUNDING = 1e-6  # of a reading, °
@@ -57,13 +59,21 @@ def in_coordinates(points: Points, where: str) -> Points:
 
 def _arm(facts: MachineFacts) -> Arm:
     joints, up = facts.joint, np.array(facts.arm.up, dtype=np.float64)
+    tool, revolute = np.array(facts.arm.tool_mm), np.array([joint.type == "revolute" for joint in joints])
+    geometry: dict[str, Any] = {"rows": np.array([joint.row for joint in joints]), "tool_mm": tool}
+    if facts.arm.home:
+        home = np.vstack([np.array(facts.arm.home)[:3], [0.0, 0.0, 0.0, 1.0]])
+        home[:3, :3] = nearest_rotations(home[None, :3, :3])[0]
+        directions, through = (np.array([getattr(joint, of) for joint in joints]) for of in ("unit", "through"))
+        geometry = rows_of_screws(directions, through, revolute, home)
+        geometry["tool_mm"] = geometry["tool_mm"] + tool
     return Arm(
         facts.name,
-        rows=np.array([joint.row for joint in joints]),
+        **geometry,
+        by_screws=bool(facts.arm.home),
         modified=facts.arm.convention == "modified",
-        revolute=np.array([joint.type == "revolute" for joint in joints]),
+        revolute=revolute,
         sense=np.array([-1.0 if joint.reversed else 1.0 for joint in joints]),
-        tool_mm=np.array(facts.arm.tool_mm),
         up=up / np.linalg.norm(up),
         limits=np.array([joint.travel or [np.nan, np.nan] for joint in joints]),
     )

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import datetime as dt
 import io
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,9 @@ from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.parts.part import write_part
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.app.commands.report import evaluate_job, report_outcome, write_report
+from cmm_uq.artefacts.optical import tracked
 from cmm_uq.artefacts.optical.tracked import TrackedPoints, predicted_poses
+from cmm_uq.base.arm import THETA, Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.job import Job
@@ -159,7 +163,7 @@ def test_the_certificate_has_the_rows_as_found(tmp_path: Path) -> None:
 
 def test_a_job_of_an_export_names_effects_that_its_arm_has() -> None:
     """As a new job does, but for what needs a column that the export has not."""
-    told = robot().facts.machine.model_dump()
+    told = robot().facts.machine.model_dump(exclude_unset=True)
     given = {"job": {"date": dt.date(2026, 1, 1)}, "machine": {"name": "R", "arm": told["arm"], "joint": told["joint"]}}
     made = job_of_export("tracked_points", given, {"recording.csv": recording({}).partition(b"\n")[2]}, id="r")[
         "job.toml"
@@ -174,3 +178,35 @@ def test_no_part_is_evaluated_by_the_certificate_of_an_arm(tmp_path: Path) -> No
     shutil.copy(tmp_path / "machine" / "certificate-simulated.pdf", tmp_path / "part" / "machine")
     with pytest.raises(CmmUqError, match="the machine's certificate is of an arm"):
         write_part(tmp_path / "part", tmp_path / "out")
+
+
+def test_a_robot_by_screw_axes_is_the_one_by_its_rows_and_its_axes_are_found() -> None:
+    """The same robot stated either way leaves the same distances, and its screw axes are found."""
+    by_rows = robot()
+    arm = by_rows.points.machine
+    assert isinstance(arm, Arm)
+    home = arm.at(np.zeros((1, 6)))
+    text = re.sub(r"\njoint = .*\narm = .*", "", FILES["job.toml"].decode())
+    axes = "".join(
+        f"[[machine.joint]]\ndirection = {home.axes[0, i, THETA].tolist()}\npoint_mm = {home.origins[0, i, THETA].tolist()}\n"
+        for i in range(6)
+    )
+    frame = np.column_stack([home.flange[0], home.tool[0] - home.flange[0] @ arm.tool_mm]).tolist()
+    stated = f"[machine.arm]\nhome = {frame}\ntool_mm = {arm.tool_mm.tolist()}\n{axes}\n[artefact]"
+    job = job_of({**FILES, "job.toml": text.replace("[artefact]", stated, 1).encode()})
+    assert_allclose(job.points.xyz, by_rows.points.xyz, atol=1e-4)  # as recorded
+    result, other = evaluate_job(job), evaluate_job(by_rows)
+    assert isinstance(result, Result)
+    assert isinstance(other, Result)
+    positions, same = tracked.results(result)["positions"], tracked.results(other)["positions"]
+    for when in ("before", "after"):
+        assert positions[when]["rms_um"] == pytest.approx(same[when]["rms_um"], rel=1e-3)
+    found = tracked.results(result)["screws"]
+    rows = np.array([[row[key] for key in ("a_mm", "alpha_deg", "d_mm", "theta_deg", "beta_deg")]
+                     for row in tracked.results(other)["rows"]])  # fmt: skip
+    rows[:, [1, 3, 4]] = np.radians(rows[:, [1, 3, 4]])
+    exact = replace(arm, rows=rows).at(np.zeros((1, 6)))
+    for i, screw in enumerate(found[1:5], 1):  # the first and the last are in part the frame's and the tool's
+        assert_allclose(screw["direction"], exact.axes[0, i, THETA], atol=3e-4)
+        off = np.array(screw["point_mm"]) - exact.origins[0, i, THETA]
+        assert np.linalg.norm(np.cross(off, screw["direction"])) < 0.3

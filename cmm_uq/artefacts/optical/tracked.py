@@ -127,7 +127,9 @@ def results(result: Result) -> dict[str, Any]:
         shown = dict(zip(_SHARES, shares, strict=True))
         found["held_out"] = {**_figures(predicted.off), **shown, "points": len(predicted.off)}
     machine = result.artefact.points.machine
-    rows = {"rows": rows_of(result, machine)} if isinstance(machine, Arm) else {}
+    rows: dict[str, Any] = {}
+    if isinstance(machine, Arm):
+        rows = {"screws": screws_of(result, machine)} if machine.by_screws else {"rows": rows_of(result, machine)}
     return {"positions": found, **rows}
 
 
@@ -148,9 +150,23 @@ def rows_of(result: Result, arm: Arm) -> list[dict[str, float]]:
     return rows
 
 
+def screws_of(result: Result, arm: Arm) -> list[dict[str, list[float]]]:
+    """Screw axes of the arm as found, as job.toml has them: directions, and the points next to the origin of the base."""
+    scale = np.where(np.isin(np.arange(5), (A, D)), 1.0, np.radians(1.0))
+    rows = np.array([[row[_KEYS[i]] for i in range(5)] for row in rows_of(result, arm)]) * scale
+    pose, found = replace(arm, rows=rows).at(np.zeros((1, len(rows)))), []
+    for joint, turns in enumerate(arm.revolute):
+        direction, point = (each[0, joint, THETA if turns else D] for each in (pose.axes, pose.origins))
+        place = {"point_mm": (point - (point @ direction) * direction).tolist()} if turns else {}
+        found.append({"direction": direction.tolist(), **place})
+    return found
+
+
 def sections(result: Result) -> list[Section]:
     data = results(result)
-    rows = _rows(data["rows"], result) if "rows" in data else None
+    rows = (
+        _rows(data["rows"], result) if "rows" in data else _screws(data["screws"], result) if "screws" in data else None
+    )
     return [section(say("Positions of the tool"), _table(data["positions"], result), _arrows(result), rows)]
 
 
@@ -189,13 +205,22 @@ def _rows(rows: list[dict[str, float]], result: Result) -> Table | None:
         (Verbatim(joint.upper()), *(signed(row[_KEYS[i]], ".4f" if i in (A, D) else ".5f") for i in range(5)))
         for joint, row in zip(cast("Arm", result.artefact.points.machine).joints, rows, strict=True)
     )
-    note = say("What the recording leaves open stands as the job has it.")
-    return table(
-        say("Rows of the arm as found"),
-        (say("Joint"), *(Column(Verbatim(name), unit(of)) for name, of in figures)),
-        each,
-        note,
-    )
+    heads: list[Text | Column] = [say("Joint"), *(Column(Verbatim(name), unit(of)) for name, of in figures)]
+    return table(say("Rows of the arm as found"), heads, each, _LEFT_OPEN)
+
+
+def _screws(screws: list[dict[str, list[float]]], result: Result) -> Table | None:
+    joints = zip(cast("Arm", result.artefact.points.machine).joints, screws, strict=True)
+    each = []
+    for joint, screw in joints:
+        place = [signed(value, ".4f") for value in screw["point_mm"]] if "point_mm" in screw else [NOTHING] * 3
+        each.append((Verbatim(joint.upper()), *(signed(value, ".7f") for value in screw["direction"]), *place))
+    directions = (Column(Verbatim(f"ω {axis}")) for axis in AXES)
+    heads: list[Text | Column] = [say("Joint"), *directions, *(Column(Verbatim(axis), unit("mm")) for axis in AXES)]
+    return table(say("Screw axes of the arm as found"), heads, each, _LEFT_OPEN)
+
+
+_LEFT_OPEN = say("What the recording leaves open stands as the job has it.")
 
 
 def _arrows(result: Result) -> Block:

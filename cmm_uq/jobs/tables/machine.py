@@ -6,7 +6,6 @@ import datetime as dt
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import AfterValidator, Field
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
@@ -16,7 +15,6 @@ from cmm_uq.base.files.table import (
     Length,
     Limit,
     Number,
-    Position,
     Positive,
     Range,
     Temperature,
@@ -25,6 +23,7 @@ from cmm_uq.base.files.table import (
     key,
     required,
 )
+from cmm_uq.jobs.tables.arm import MOST_JOINTS, ArmFacts, JointFacts
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -256,45 +255,6 @@ def stated_axes(axes: Iterable[AxisFacts]) -> dict[str, AxisFacts]:
     return {name: one for one in axes if one.reading != "unknown" for name in one.names}
 
 
-MOST_JOINTS = 12
-JointAngle = Annotated[float, Field(ge=-720, le=720)]
-
-
-class JointFacts(JobTable):
-    """One ``[[machine.joint]]``: a Denavit–Hartenberg row. The joints read `q1_deg`, `q2_deg` and so on."""
-
-    type: Literal["revolute", "prismatic"] = key("revolute", "Whether the joint turns, or shifts and reads `q3_mm`.")
-    a_mm: Position = key(0.0, "Length a of the link, along x.")
-    alpha_deg: JointAngle = key(0.0, "Twist α of the link, about x.")
-    d_mm: Position = key(0.0, "Offset d along z; of a prismatic joint where it reads 0.")
-    theta_deg: JointAngle = key(0.0, "Angle θ about z; of a revolute joint where it reads 0.")
-    beta_deg: JointAngle = key(0.0, "Hayati's angle β about y, between axes that are nearly parallel.")
-    reversed: bool = key(False, "Whether the reading counts against the right hand about z, or against z.")
-    travel: Range | None = key(None, "Lowest and highest reading, in degrees or mm.")
-
-    @property
-    def row(self) -> tuple[float, ...]:
-        angles = self.alpha_deg, self.theta_deg, self.beta_deg
-        alpha, theta, beta = (float(np.radians(angle)) for angle in angles)
-        return self.a_mm, alpha, self.d_mm, theta, beta
-
-
-class ArmFacts(JobTable):
-    """``arm``: what holds for all of its joints."""
-
-    convention: Literal["standard", "modified"] = "standard"
-    """Whether rows are standard, θ d a α from this joint to the next, or modified (Craig), α a θ d from the one before."""
-    tool_mm: Triple = [0.0, 0.0, 0.0]
-    """What is measured on the flange, in the frame of the last row: a ball, a stylus, a reflector. Of several reflectors the
-    recording has how far each is beyond it, `tip_x_mm`, `tip_y_mm`, `tip_z_mm`."""
-    up: Triple = [0.0, 0.0, 1.0]
-    """The direction against gravity in the frame of the base, for how joints sag: an arm on the ceiling has [0, 0, -1]."""
-
-    def problems(self) -> Iterator[str]:
-        if not any(self.up):
-            yield "up = [0, 0, 0] is no direction"
-
-
 class FurtherFacts(JobTable):
     """One ``further``: another certificate of the machine, of another artefact or of another day."""
 
@@ -346,6 +306,16 @@ class MachineFacts(JobTable):
             yield f"[machine.table] is of a rotary table, which chain = {self.chain!r} has not: give it behind a bar, as XYZ|C"
         if self.joint and (wrong := sorted(self.model_fields_set - _OF_ARMS)):
             yield f"{wrong[0]} is of a machine of carriages, and [[machine.joint]] of an arm: leave one of them out"
+        screws = [number for number, joint in enumerate(self.joint, 1) if joint.direction is not None]
+        if screws and len(screws) < len(self.joint):
+            other = next(i for i in range(1, len(self.joint) + 1) if i not in screws)
+            yield f"joint {screws[0]} is a screw axis and joint {other} a row: state all joints in one way"
+        if screws and not self.arm.home:
+            yield "[machine.arm] home is missing: screw axes do not say where the last frame is when all joints read 0"
+        if self.arm.home and self.joint and not screws:
+            yield "[machine.arm] home is of screw axes, and joints are rows: leave it out, or give direction and point_mm"
+        if screws and "convention" in self.arm.model_fields_set:
+            yield "[machine.arm] convention is of rows, and joints are screw axes: leave it out"
         if self.arm.model_fields_set and not self.joint:
             yield "[machine.arm] is of an arm: give its rows, [[machine.joint]]"
 
