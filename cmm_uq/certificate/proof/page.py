@@ -119,8 +119,10 @@ def warnings_of(proof: DiagnosisProof) -> tuple[Text, ...]:
         for one in proof.accepted if one.standing == MISSED
     ]  # fmt: skip
     if count := proof.judgement.refused.count:
-        many = say("{count} cases got no answer; they count in no other figure.", count=count)
-        found.append(plural(count, one=say("One case got no answer; it counts in no other figure."), many=many))
+        one = say("One case got no answer; it counts as a false alarm where it hides nothing, else as not found.")
+        found.append(plural(count, one=one, many=say(
+            "{count} cases got no answer; they count as false alarms where they hide nothing, else as not found.", count=count
+        )))  # fmt: skip
     return tuple(found)
 
 

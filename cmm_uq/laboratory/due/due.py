@@ -205,6 +205,7 @@ def _checked(
         why = say("{why}; the interim check of {day} has no value in common with the calibration", why=why, day=at)
         return planned, why
     extended, lengthens = planned, rule.method == "fixed" and rule.longest_months is not None
+    lengthens = lengthens and not (one.certificate.state == "draft" and last.state == "released")
     if lengthens and not one.proves:
         return planned, say(
             "{why}; the interim check of {day}, in control, shows too little to lengthen it", why=why, day=at

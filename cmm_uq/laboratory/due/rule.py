@@ -235,8 +235,9 @@ def check_standings(calibration: RecordedCertificate, checks: Sequence[RecordedC
     found: list[InterimCheck] = []
     before: dict[str, ValueChange] = {}
     for given in checks:
-        # a check that states no limits is held to those of the calibration
-        limited = tuple(replace(one, limit=one.limit or limits.get(one.name)) for one in given.values)
+        # a check is held to the limits of the calibration too, whatever wider ones, or none, it states
+        least = ((one, [each for each in (one.limit, limits.get(one.name)) if each]) for one in given.values)
+        limited = tuple(replace(one, limit=min(both, default=None)) for one, both in least)
         check = replace(given, values=limited)
         known = (one for one in check.values if one.name in stated)
         changes = {one.name: change(stated[one.name], _stated(one, check)) for one in known}

@@ -245,8 +245,8 @@ class ProofJudgement:
 
     @cached_property
     def false_alarms(self) -> Rate:
-        """Cases that hide nothing and of which something else than *consistent* is said."""
-        return _rate(self.of_kind(NOTHING), lambda one: one.verdict not in AGREES)
+        """Cases that hide nothing and of which something is said to be missing, or that got no answer."""
+        return _rate([one for one in self.cases if one.case.kind == NOTHING], lambda one: one.verdict not in AGREES)
 
     @cached_property
     def found(self) -> Rate:
@@ -264,7 +264,7 @@ class ProofJudgement:
 
     @cached_property
     def right(self) -> Rate:
-        return _rate(self.answered, lambda one: one.right)
+        return _rate(self.cases, lambda one: one.right)
 
     @cached_property
     def coverage(self) -> Rate:

@@ -201,6 +201,19 @@ def test_an_interim_check_out_of_control_is_found_among_all_machines(three: Path
     assert "out of control (Scale error of x:" in found["why"]
 
 
+@pytest.mark.parametrize("asked", [(), ("1102",)])
+def test_a_draft_after_a_check_out_of_control_does_not_hide_it(tmp_path: Path, asked: tuple[str, ...]) -> None:
+    far = (("scale_x.ppm", "Scale error of x", "ppm", 6.0, 0.5, 5.0, 7.0, 0.2, 8.0),)
+    check = certificate("1102", dt.date(2026, 9, 1), far, interim=True)
+    place = recorded(
+        tmp_path, certificate("1102", dt.date(2026, 3, 2)), check, certificate("1102", dt.date(2026, 10, 1))
+    )
+    with open_records(place) as records:
+        records.append("release", {"certificate": 1, "by": "A. Releaser", "reason": "checked", "complete": True})
+    found = json.loads(run("due", *asked, "--records", place, "--on", ON, "--json").stdout)["items"][0]
+    assert (found["state"], found["due"]) == ("overdue", "2026-09-01")
+
+
 def test_a3_pools_the_machines_of_a_model(tmp_path: Path) -> None:
     """Twenty intervals, fifteen within the limits, target 95 %: 231 days of 365 in the tutorial; here of 12 mean months."""
     rule = {"method": "A3", "reliability": 0.95}

@@ -178,6 +178,20 @@ def test_a_check_without_limits_is_held_to_those_of_the_calibration() -> None:
     assert due(certificate(FIRST_of_made, first), certificate(day, then, interim=True)).due == day
 
 
+def test_a_check_with_wider_limits_is_held_to_those_of_the_calibration() -> None:
+    day, first = dt.date(2024, 6, 1), value(9.8, limit=10.0)
+    assert due(certificate(FIRST_of_made, first), certificate(day, value(10.5, limit=10.0), interim=True)).due == day
+    assert due(certificate(FIRST_of_made, first), certificate(day, value(10.5, limit=100.0), interim=True)).due == day
+
+
+def test_a_check_that_nobody_released_lengthens_nothing_beside_a_released_calibration() -> None:
+    rule = {"every_months": 12, "longest_months": 24}
+    draft = check(dt.date(2024, 6, 1), 1.2, state="draft")
+    assert due(certificate(FIRST_of_made), draft, rule=rule).due == dt.date(2025, 3, 1)
+    assert due(certificate(FIRST_of_made, state="draft"), draft, rule=rule).due == dt.date(2025, 6, 1)
+    assert due(certificate(FIRST_of_made), check(dt.date(2024, 6, 1), 7.0, state="draft")).due == dt.date(2024, 6, 1)
+
+
 def test_a_check_of_other_values_lengthens_nothing() -> None:
     other = certificate(dt.date(2024, 6, 1), value(1.0, name="scale_y.ppm"), interim=True)
     found = due(certificate(FIRST_of_made), other, rule={"every_months": 12, "longest_months": 24})

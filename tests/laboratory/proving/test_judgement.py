@@ -122,7 +122,7 @@ def test_rates_are_those_counted_by_hand() -> None:
                      "predicts_better", "refused", "coverage")
     }  # fmt: skip
     assert counts == {
-        "false_alarms": (1, 3), "found": (3, 5), "found_alone": (2, 5), "wrong_names": (2, 9), "right": (5, 9),
+        "false_alarms": (1, 3), "found": (3, 5), "found_alone": (2, 5), "wrong_names": (2, 9), "right": (5, 10),
         "recognised": (1, 2), "machine_blamed": (1, 1), "predicts_better": (5, 5), "refused": (1, 10),
         "coverage": (5, 7),
     }  # fmt: skip
@@ -158,6 +158,13 @@ def test_a_limit_is_kept_or_missed_where_the_whole_interval_says_so(
     """Two percent: the upper end of 0 of n is 1 − 0.025^(1/n), below it from 183 on; the lower one of 5 of 60 is 2.8 %."""
     one, _ = acceptance_figures(alarms(count, of), ProveFacts())
     assert (one.key, one.standing, one.kept) == ("false_alarms", standing, kept)
+
+
+def test_cases_without_an_answer_do_not_make_the_rest_look_good() -> None:
+    """Of 200 that hide nothing 183 would show it by themselves; 17 got no answer."""
+    answers = [said("consistent")] * 183 + [{"refused": "damaged"}] * 17
+    one, _ = acceptance_figures(ProofJudgement(tuple(judged(case(NOTHING), each) for each in answers)), ProveFacts())
+    assert (one.rate.count, one.rate.of, one.standing) == (17, 200, MISSED)
 
 
 def test_further_figures_are_asked_for_where_they_are_stated() -> None:

@@ -152,9 +152,11 @@ class _Reading:
         """What its rule needs of a machine: its newest certificate where that will do."""
         rule, late = Rule.of(machine.calibrate), self._late.get(machine.serial)
         newest, checked = self._newest.get(machine.serial), self._checked.get(machine.serial)
-        later = checked is not None and (newest is None or (checked.day, checked.entry) > (newest.day, newest.entry))
-        if newest is not None and not later and rule.method == "fixed":
-            released = self._released.get(machine.serial, newest)
+        released = self._released.get(machine.serial, newest)
+        later = checked is not None and (
+            released is None or (checked.day, checked.entry) > (released.day, released.entry)
+        )
+        if newest is not None and released is not None and not later and rule.method == "fixed":
             newer = [newest] if released.entry != newest.entry else []
             return CalibrationRecord(machine, rule, [released, *newer], newest.entry not in self._without, late)
         past = self._past(machine.serial)
