@@ -119,10 +119,11 @@ def warnings_of(proof: DiagnosisProof) -> tuple[Text, ...]:
         for one in proof.accepted if one.standing == MISSED
     ]  # fmt: skip
     if count := proof.judgement.refused.count:
-        one = say("One case got no answer; it counts as a false alarm where it hides nothing, else as not found.")
-        found.append(plural(count, one=one, many=say(
-            "{count} cases got no answer; they count as false alarms where they hide nothing, else as not found.", count=count
-        )))  # fmt: skip
+        one = say("One case got no answer; it is a false alarm where it hides nothing, else not found.")
+        many = say(
+            "{count} cases got no answer; each is a false alarm where it hides nothing, else not found.", count=count
+        )
+        found.append(plural(count, one=one, many=many))
     return tuple(found)
 
 
