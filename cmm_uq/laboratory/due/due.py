@@ -80,7 +80,8 @@ class DueItem:
     remarks: tuple[Text, ...] = ()  # what else is to be known, a sentence each
     artefact: str = ""  # serial of the artefact that its last calibration was made with
     blocked: Text | None = None
-    beyond: bool = False  # whether its last certificate finds it beyond its limits: it is overdue from that day on
+    # whether its last certificate finds it beyond its limits, or a check out of control: it is overdue from that day on
+    beyond: bool = False
 
     def state(self, on: dt.date, within: dt.timedelta) -> State:
         """Overdue before a day or beyond its limits, due within a time of it, later, or unknown."""
@@ -142,12 +143,12 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
         one for one in (*machine.adjusted, *(one.adjusted_since for one in known)) if one is not None and one <= on
     ]
     adjusted = [one for one in every if last.day < one]
-    due, reason = _due_date(of, last, adjusted, pool)
+    due, reason, beyond = _due_date(of, last, adjusted, pool)
     counts = last
     if waits:  # a draft may end an interval, and begins none
         before = _due_date(of, released[-1], [one for one in every if released[-1].day < one], pool)
         if before[0] < due:
-            (due, reason), counts = before, released[-1]
+            (due, reason, beyond), counts = before, released[-1]
     blocked: Text | None = None
     if (used := artefacts.get(last.artefact)) is not None and used.due is not None and used.due < max(on, due):
         artefact, until = Verbatim(used.serial), day(used.due)
@@ -159,26 +160,27 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
         else:
             text = say("Its artefact {artefact} is itself due on {due}, before that.", artefact=artefact, due=until)
             remarks.append(text)
-    return item(
-        counts.day, due, reason, tuple(remarks), last.artefact, blocked, last.decision in BEYOND and not adjusted
-    )
+    return item(counts.day, due, reason, tuple(remarks), last.artefact, blocked, beyond)
 
 
 def _due_date(
     of: CalibrationRecord, last: RecordedCertificate, adjusted: Sequence[dt.date], pool: Pool
-) -> tuple[dt.date, Text]:
-    """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule."""
+) -> tuple[dt.date, Text, bool]:
+    """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule.
+
+    And whether the certificate, or a check, finds it beyond its limits or out of control.
+    """
     if adjusted:
-        return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
+        return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted))), False
     if last.decision in BEYOND:
-        return last.day, say("its last certificate finds it beyond its limits")
+        return last.day, say("its last certificate finds it beyond its limits"), True
     known, rule = of.certificates, of.rule
     # the drift model takes checks after the calibration too; other methods count what calibrations found
     seen = known if rule.method == "drift" else known[: known.index(last) + 1]
     interval = interval_by(rule, seen, pool, of.priors)
     planned = _ends(last.day, interval)
     checks = check_standings(last, [one for one in known[known.index(last) + 1 :] if one.interim])
-    return _checked(rule, last, planned, interval.why, checks)
+    return *_checked(rule, last, planned, interval.why, checks), any(one.standing == "action" for one in checks)
 
 
 def _ends(start: dt.date, interval: RecalibrationInterval) -> dt.date:

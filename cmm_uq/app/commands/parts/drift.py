@@ -121,8 +121,15 @@ def with_drift(
         found = aged(state, on)
         return AgedMachine(found, _drift(found, known=False))
     if kept is None:
-        from cmm_uq.app.commands.laboratory.due import history_of
+        from cmm_uq.app.commands.laboratory.due import history_of, what_is_due
 
+        found_so = next(one for one in what_is_due(records, [serial], on=on).items if one.item == "machine")
+        if found_so.beyond:
+            raise CmmUqError(
+                f"the records say that the machine is overdue: {str.__str__(found_so.why)}",
+                where=where,
+                fix="Calibrate the machine, and measure the part again",
+            )
         kept = attached_history(history_of(serial, records, on=on), since)
     known = known_of(kept)
     late = max((day for day in known.adjusted if since < day <= on), default=None)

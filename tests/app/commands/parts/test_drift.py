@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from cmm_uq.analysis.machine.state import MachineState
 from cmm_uq.app.commands.parts.drift import known_of, with_drift
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
+from cmm_uq.laboratory.records import open_records
 from cmm_uq.machine.physics.catalogue import effects
 from tests.app.cli.test_due import recorded, scale
 from tests.laboratory.records.histories import certificate
@@ -53,6 +55,18 @@ def test_a_steady_drift_goes_on_by_its_rate_and_more(records: Path) -> None:
     assert "They say nothing of Scale error of Y" in found.told
     later = with_drift(STATE, "1102", dt.date(2029, 3, 2), records, "job.toml")
     assert found.state.drift[0] < 0.6 * later.state.drift[0]
+
+
+@pytest.mark.parametrize(
+    "found", [{"interim": True, "values": scale(20.0)}, {"decision": "fail"}], ids=["check", "fail"]
+)
+def test_a_machine_that_its_records_find_out_of_control_measures_no_part(records: Path, found: dict[str, Any]) -> None:
+    """By an interim check of the very day, or a calibration that it fails; on the day before nothing is known of it."""
+    with open_records(records) as known:
+        known.append("check" if "interim" in found else "report", certificate("1102", ON, **found))
+    with_drift(STATE, "1102", ON - dt.timedelta(days=1), records, "job.toml")
+    with pytest.raises(CmmUqError, match="the records say that the machine is overdue"):
+        with_drift(STATE, "1102", ON, records, "job.toml")
 
 
 def test_calibrations_of_one_month_say_nothing_of_the_season_in_another(tmp_path: Path) -> None:
