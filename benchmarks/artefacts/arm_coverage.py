@@ -1,6 +1,6 @@
 """Robots that a tracker measured, by equations that share no code with the package: do certificates hold what is true?
 
-Run:  python -m benchmarks.artefacts.arm_coverage coverage|diagnosis COUNT
+Run:  python -m benchmarks.artefacts.arm_coverage coverage|diagnosis COUNT [FIRST]
 
 Each robot has rows of its own (industrial, with parallel axes 2 and 3 and a wrist), a tool, a place of the tracker and poses;
 errors of its rows are drawn from half of what the package holds for possible, or from a tenth of it. Places are products of
@@ -183,7 +183,8 @@ def shown(total: Mapping[str, int]) -> str:
 if __name__ == "__main__":
     study = {"coverage": covered, "diagnosis": diagnosed}[sys.argv[1]]
     total, start = Counter[str](), time.monotonic()
-    for number in range(int(sys.argv[2])):
+    first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+    for number in range(first, first + int(sys.argv[2])):
         total += study(number)
         if number % 50 == 49:
             print(f"{number + 1} robots, {time.monotonic() - start:.0f} s\n{shown(total)}\n", flush=True)

@@ -81,7 +81,10 @@ def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str,
         plan={"lengths_mm": [20.0, *(100.0 * i for i in range(1, 10))], "repeats": 3}, **others,
     )  # fmt: skip
     artefact, plan = f"gauge_lines:{class_}", f"gauge_lines:{name.upper()}"
-    return _kind(name, ReferencedFacts, artefact, begin, LENGTHS, *ERRORS, page="gauge_lines_page", plan=plan)
+    also = {"arm_lengths": f"{_HERE}.beginnings:ARM_LENGTHS"} if name == "step_gauge" else {}
+    return _kind(
+        name, ReferencedFacts, artefact, begin, LENGTHS, *ERRORS, page="gauge_lines_page", plan=plan, begin_also=also
+    )
 
 
 NORMALS = ("nx", "ny", "nz")
@@ -160,7 +163,9 @@ SPHERE = _kind("sphere", SphereFacts, "spheres.sphere:SphereArtefact", Beginning
     effects=("probe_radius", "probe_lobing"), test=circumstances(u_form_um=0.02), recorded=AT_20_C, plan={"repeats": 1},
     conformity={"standard": "ISO 10360-5:2010", "limit_um": 4.0, "rule": "ISO 14253-1"},
     further=dict.fromkeys((*NORMALS, *APPROACHES), ""), noise_um=0.3,
-), FORMS)  # fmt: skip
+), FORMS, "L_Dia", begin_also={
+    name: f"{_HERE}.beginnings:{name.upper()}" for name in ("arm_sphere", "arm_orientations")
+})  # fmt: skip
 
 
 class PlaneFacts(ArtefactFacts):
@@ -347,10 +352,20 @@ _SCANNED = f"{_HERE}.optical.planes"
 SCANNED_PLANES = Kind(
     "scanned_planes", ScannedPlaneFacts, f"{_SCANNED}:ScannedPlanes", page=f"{_SCANNED}:PAGE", begin=f"{_SCANNED}:BEGIN"
 )
+
+
+class TrackedFacts(ReferencedFacts):
+    """The reference instrument."""
+
+    frame: Literal["own", "base"] = "own"
+    """Whether its places are in a frame of its own, or of the base of the robot, as pose accuracy (ISO 9283) needs."""
+
+
 _TRACKED = f"{_HERE}.optical.tracked"
 TRACKED_POINTS = Kind(
-    "tracked_points", ReferencedFacts, f"{_TRACKED}:TrackedPoints", f"{_TRACKED}:SCREENING",
+    "tracked_points", TrackedFacts, f"{_TRACKED}:TrackedPoints", f"{_TRACKED}:SCREENING",
     f"{_HERE}.optical.poses:PLANNING", f"{_TRACKED}:PAGE", f"{_TRACKED}:BEGIN",
+    begin_also={"robot_poses": f"{_HERE}.beginnings:POSES"}, tested=("AP", "RP"),
 )  # fmt: skip
 
 
@@ -367,6 +382,23 @@ class TableSpheresFacts(ArtefactFacts):
     def traced(self) -> bool:
         return False
 
+
+class SeatFacts(ArtefactFacts):
+    """Nothing of the seat is certified."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    @property
+    def traced(self) -> bool:
+        return False
+
+
+_SEAT = f"{_HERE}.spheres.seat"
+SEAT = Kind(
+    "seat", SeatFacts, f"{_SEAT}:Seat", f"{_SEAT}:SCREENING", page=f"{_SEAT}:PAGE", begin=f"{_HERE}.beginnings:SEATS",
+    instead="Choose seats near the base, in the middle of the reach and far out; bend the arm otherwise for each reading",
+    tested=("SPAT", "SPAT maximum"),
+)  # fmt: skip
 
 _TABLE = f"{_HERE}.spheres.table_spheres"
 _AXIS = tuple(f"rotary_{name}" for name in ("location_c_x", "location_c_y", "tilt_c_x", "tilt_c_y", "positioning_c_1"))
@@ -385,5 +417,5 @@ TABLE_SPHERES = Kind(
 )  # fmt: skip
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
-    MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS, TABLE_SPHERES,
+    MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS, TABLE_SPHERES, SEAT,
 )}  # fmt: skip

@@ -20,6 +20,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ class Arm(Machine):
     """A machine of joints q1, q2, …, whose coordinates are those of its tool in the frame of its base.
 
     What the tool measures with, or a reflector on it, is offset from the flange by ``tool_mm``, and by ``tip_x_mm``,
-    ``tip_y_mm`` and ``tip_z_mm`` where these are recorded.
+    ``tip_y_mm`` and ``tip_z_mm`` where these are recorded. Of an arm without rows coordinates alone are known, from its base.
     """
 
     rows: Floats = field(default_factory=lambda: np.zeros((0, 5)))  # (j, 5) a, α, d, θ, β at reading 0, mm and rad
@@ -73,9 +74,11 @@ class Arm(Machine):
     # (3,) against gravity, in the frame of the base
     up: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     limits: Floats = field(default_factory=lambda: np.zeros((0, 2)))  # (j, 2) lowest and highest readings, ° or mm
+    reach_mm: float = np.nan  # from its base to the farthest place that it measures
     # (5 j + 3,) or (n, 5 j + 3) by how much parameters of rows and tool differ from these
     change: Floats | None = None
     axes: tuple[str, ...] = field(init=False)
+    commanded: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axes", (*AXES, *self.joints))
@@ -95,7 +98,7 @@ class Arm(Machine):
         return np.column_stack([self.place(xyz, columns), *(columns[name] for name in self.columns_of_joints)])
 
     def coordinates(self, readings: Floats) -> Floats:
-        return self.at(readings[:, -len(self.rows) :]).tool - self.origin_mm
+        return self.at(readings[:, 3:]).tool - self.origin_mm if self.joints else super().coordinates(readings)
 
     def limits_of(self, axis: str) -> tuple[Floats, str, str]:
         if axis in AXES:

@@ -12,7 +12,7 @@ from functools import cached_property
 from itertools import combinations
 from math import comb
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,8 @@ class Machine:
     axes: tuple[str, ...] = tuple(AXES)  # names of the axes that are read
     # by axis, how it is read, as somebody states it: ``AxisFacts`` of a job
     read_by: Mapping[str, Any] = field(default_factory=dict)
+    # whether coordinates may be commanded ones, so that what was found there stands in columns named ``reference_…``
+    commanded: ClassVar[bool] = False
 
     def coordinates(self, readings: Floats) -> Floats:
         """Recorded coordinates (n, 3), mm, of scale readings (n, axes)."""
@@ -176,7 +178,8 @@ class Points:
         Where lengths alone were recorded, no more of them that are equal than rounding makes equal are no copies.
         """
         same: dict[bytes, list[int]] = {}
-        read = [values for name, values in sorted(self.columns.items()) if name.startswith("reading_")]
+        found_in = ("reading_", "reference_") if self.machine.commanded else "reading_"
+        read = [values for name, values in sorted(self.columns.items()) if name.startswith(found_in)]
         whole = np.column_stack([self.xyz, *read])
         order = np.lexsort(whole.T)
         alike = np.all(whole[order[1:]] == whole[order[:-1]], axis=1)

@@ -39,7 +39,7 @@ EXAMPLE = {
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
     "digitizer": "digitizer-simulated", "axis_runs": "axis-runs-simulated", "multilateration": "multilateration-simulated",
     "scanned_planes": "scanned-planes-simulated", "tracked_points": "robot-simulated",
-    "table_spheres": "table-spheres-simulated",
+    "table_spheres": "table-spheres-simulated", "seat": "arm-seat-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
 PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}

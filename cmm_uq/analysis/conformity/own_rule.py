@@ -93,21 +93,27 @@ def titled(standard: str) -> Text:
 def decided(test: Test, *, name: str) -> Statement:
     """One figure of the artefact, everywhere that it has a value."""
     quantity, measured, lines = FIGURES[name]
-    figure = test.artefact.figures(_counting(test.recorded.points))
+    figure = test.artefact.figures(counting(test.recorded.points))
     if name not in figure or not len(figure[name].values):
         if lines == LENGTH_LINES:
             test.indications()
         problem = f"the readings do not determine the {name} of the {test.artefact.kind}"
         fix = "Record more places in more directions, or repeats, or leave the statement out"
         raise test.error(problem, "characteristic", fix)
-    found = figure[name]
+    return figure_decided(test, figure[name], quantity, measured, lines, of_two_sides=name in SIGNED)
+
+
+def figure_decided(
+    test: Test, found: ArtefactFigure, quantity: Text, measured: Text, lines: tuple[str, ...], *, of_two_sides: bool
+) -> Statement:
+    """Values of a figure, each against its limit, with what these lines leave uncertain."""
     causes = _causes(test, found, lines)
     test.refuse_without_uncertainty(float(causes.u.min()), _key(test.artefact.key_of_u, lines))
     points, aside = test.artefact.points, test.set_aside(found.rows)
     of, repeats = points.measurement[found.rows], points.repeat[found.rows]
     one, same = (np.all(values == values[:, :1], axis=1) for values in (of, repeats))
     items = test.each_decided(
-        found.values / MICROMETRE, causes.u, found.lengths, signed=name in SIGNED, set_aside=aside,
+        found.values / MICROMETRE, causes.u, found.lengths, signed=of_two_sides, set_aside=aside,
         measurement=[int(number) if alone else None for number, alone in zip(of[:, 0], one, strict=True)],
         repeat=[int(turn) if alone else None for turn, alone in zip(repeats[:, 0], one & same, strict=True)],
         position=found.names,
@@ -129,7 +135,7 @@ def decided(test: Test, *, name: str) -> Statement:
                 limit=number(test.facts.limit_arcsec, "g"),
             )
         )
-    return test.stated(quantity, measured, items, remarks, signed=name in SIGNED,
+    return test.stated(quantity, measured, items, remarks, signed=of_two_sides,
                        causes=causes if len(items) > 1 else None, budget=budget)  # fmt: skip
 
 
@@ -166,7 +172,8 @@ def _indications(found: ArtefactFigure) -> Indications:
     return Indications(found.values, found.lengths, u, found.rows)
 
 
-def _counting(points: Points) -> NDArray[np.bool_]:
+def counting(points: Points) -> NDArray[np.bool_]:
+    """Which points (n,) are of no copy."""
     return ~np.isin(points.group, list(points.copies))
 
 
@@ -184,7 +191,7 @@ def whole(asked: CompleteTest, artefact: Artefact) -> tuple[Condition, ...]:
     Points that observe nothing, as a direction point before contact, are none.
     """
     points = artefact.points
-    observed, own = np.isin(np.arange(len(points)), artefact.rows), _counting(points)
+    observed, own = np.isin(np.arange(len(points)), artefact.rows), counting(points)
     runs: dict[int, list[int]] = {}
     for group in np.unique(points.group[own]).tolist():
         runs.setdefault(points.run_of(group)[0], []).append(

@@ -242,7 +242,7 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     same: dict[int, tuple[float | None, int]] = {later: (None, one) for later, one in pairs if later != one}
     copied = set(same)
     left = [i for i, own in enumerate(numbers) if own not in copied]
-    near = {i: {j for j in left if j != i and _apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
+    near = {i: {j for j in left if j != i and apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
     chosen = most_apart(near)
     same |= {numbers[i]: (plan.apart_mm, numbers[min(near[i] & chosen)]) for i in left if i not in chosen}
     count, missing = sum(number not in same for number in numbers), list[Text]()
@@ -323,7 +323,7 @@ def _listed(numbers: Sequence[int]) -> Text:
     return commas(words)
 
 
-def _apart(one: Floats, two: Floats) -> float:
+def apart(one: Floats, two: Floats) -> float:
     """Larger distance of the ends (2, 3) of two bars, whichever way round they lie, mm."""
     return float(min(np.linalg.norm(one - turned, axis=1).max() for turned in (two, two[::-1])))
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.conformity import decision as rules, uncertainty
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, numbered
 from cmm_uq.analysis.conformity.decision import Decision, PriorKnowledge
-from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.analysis.conformity.plans import Condition, SpherePlan
 from cmm_uq.analysis.conformity.statement import Clause, Decided, Statement, clauses_in_words, counted, least_favourable
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say
@@ -24,7 +24,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty, needed, needs_prior
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
-from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.quantity import Quantity, nominal
 
 NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
@@ -343,3 +343,14 @@ def characteristic_of(standard: Standard, facts: ConformityFacts, key: str) -> C
         return standard.characteristic(facts.characteristic)
     except ValueError as error:
         raise CmmUqError(str(error), where=f"job.toml {key} characteristic", fix="Leave it out") from None
+
+
+def length_unstated(artefact: ArtefactFacts) -> str | None:
+    return "u_um" if artefact.certified and not artefact.u_um else None
+
+
+def diameter_allowed(test: Test, plan: SpherePlan) -> tuple[Condition, ...]:
+    (low, high), diameter = plan.diameter_mm, test.artefact.sizes[0].nominal
+    what = say("test sphere of {low:g} to {high:g} mm", low=low, high=high)
+    lacks = say("{what} ({diameter} mm)", what=what, diameter=nominal(diameter))
+    return (Condition(what, () if low <= diameter <= high else (lacks,)),)

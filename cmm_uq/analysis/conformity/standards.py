@@ -9,33 +9,28 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.analysis.conformity import decided, four_axis, own_rule, plans, positioning
+from cmm_uq.analysis.conformity import arms, decided, four_axis, own_rule, plans, positioning, robots
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, repeats_of_gauge, supplemented
 from cmm_uq.analysis.conformity.own_rule import form_unstated
 from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
 from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, characteristic_of
+from cmm_uq.analysis.conformity.standard import (
+    Characteristic,
+    Standard,
+    Test,
+    characteristic_of,
+    diameter_allowed,
+    length_unstated,
+)
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Remeasurement, Statement
 from cmm_uq.analysis.conformity.uncertainty import FORM_LINES, LENGTH_LINES, REPEAT_LINES, SIZE_LINES, normal_expansion
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import STANDARDS, Plugin, named, offered
-from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
-from cmm_uq.maths.uncertainty.quantity import Quantity, nominal
-
-
-def length_unstated(artefact: ArtefactFacts) -> str | None:
-    return "u_um" if artefact.certified and not artefact.u_um else None
-
-
-def diameter_allowed(test: Test, plan: plans.SpherePlan) -> tuple[Condition, ...]:
-    (low, high), diameter = plan.diameter_mm, test.artefact.sizes[0].nominal
-    what = say("test sphere of {low:g} to {high:g} mm", low=low, high=high)
-    lacks = say("{what} ({diameter} mm)", what=what, diameter=nominal(diameter))
-    return (Condition(what, () if low <= diameter <= high else (lacks,)),)
+from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
 def sensing_stated(test: Test) -> tuple[Condition, ...]:
@@ -200,6 +195,8 @@ _RULES = {
 CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
     **positioning.CLAUSES,
     four_axis.NAME: four_axis.CLAUSES,
+    **arms.CLAUSES,
+    robots.NAME: robots.CLAUSES,
     "ISO 10360-2:2009": _ISO_10360_2,
     "ASME B89.4.10360.2-2008": (
         Clause("additions", say("what it adds to ISO 10360-2"), "Not tested.", "its abstract: it incorporates the entire ISO "
@@ -291,6 +288,8 @@ _STANDARDS = (
     Standard("ISO 230-6:2002", positioning.ISO_230_6),
     Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
     Standard(four_axis.NAME, four_axis.CHARACTERISTICS),
+    *arms.STANDARDS,
+    robots.STANDARD,
     Standard("ISO 10360-5:2010", _of_sphere(("P_FTU",), ("P_STU",), plans.ISO_10360_5, _DIAMETER),
              _superseded("ISO 10360-5:2020"), "contacting"),
     Standard("ISO 10360-5:2020", _of_sphere(

@@ -1,21 +1,23 @@
 """Points whose true places another instrument measured, as a laser tracker those of a robot's tool; placed rigidly and anyhow.
 
 All three coordinates of every point are observations, as those of a plate's balls, and the six freedoms between the frames of
-both instruments are projected out. Nothing is asked of the poses but that they differ: this is a calibration. Pose accuracy
-and repeatability (ISO 9283) need poses that were commanded, and repeated thirty times.
+both instruments are projected out. Nothing is asked of the poses but that they differ: that is a calibration. Poses that were
+commanded again and again (``repeat``) have pose accuracy and repeatability too (ISO 9283).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, TypeGuard, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import fdtri, stdtrit
 
 from cmm_uq.analysis.diagnosis.held_out import numbered_by_place, predicted_folds
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
+from cmm_uq.artefacts.kinds import TrackedFacts
 from cmm_uq.artefacts.plate import REFERENCES, Plate, shape_of as shape_of_plate
 from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, D
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
@@ -26,7 +28,7 @@ from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.machine.model.artefact import Indications
+from cmm_uq.machine.model.artefact import ArtefactFigure, Indications, Placings
 from cmm_uq.machine.model.kind import Beginning
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.joints import OfJoint
@@ -57,12 +59,38 @@ class TrackedPoints(Plate):
         return None
 
     def recorded(self, points: Points, xyz: Floats) -> Points:
-        """Of an arm the joints, and what follows from them, stay: the tool is seen where the arm errs instead."""
+        """Of an arm what was commanded, or its joints, stays: the tool is seen where the arm errs instead."""
         if not isinstance(points.machine, Arm):
             return super().recorded(points, xyz)
         moved = np.einsum("nji,nj->ni", self.attitudes(xyz), points.xyz - xyz) / self.expansion[:, None]
         seen = dict(zip(REFERENCES, (self.reference + moved).T, strict=True))
         return replace(points, columns={**points.columns, **seen})
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        """RP of each pose that was commanded again; AP where places are seen in the frame of the base."""
+        points = self.points
+        _, of = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)
+        each = [own for rows in Placings.of(of.ravel()).rows if len(own := rows[counts[rows]]) > 1]
+        if not each:
+            return {}
+        middles = np.array([self.reference[own].mean(axis=0) for own in each])
+        away = [np.linalg.norm(self.reference[own] - middle, axis=1) for own, middle in zip(each, middles, strict=True)]
+        commanded = np.array([points.machine_xyz[own].mean(axis=0) for own in each])
+        rows = np.array([np.resize(own, len(points)) for own in each])
+        names = tuple(say("pose {number}", number=int(points.point[own[0]])) for own in each)
+        lengths = np.linalg.norm(commanded, axis=1)
+        repeated = np.array([one.mean() + 3 * one.std(ddof=1) for one in away])
+        found = {"RP": ArtefactFigure(repeated, rows, lengths, names=names)}
+        if cast("TrackedFacts", self._facts).frame == "base":
+            u = np.full(len(each), self.sizes[0].sd)
+            accuracy = np.linalg.norm(middles - commanded, axis=1)
+            found["AP"] = ArtefactFigure(accuracy, rows, lengths, u, names)
+        return found
+
+
+def joined(machine: Machine) -> TypeGuard[Arm]:
+    """Whether coordinates follow from joints."""
+    return isinstance(machine, Arm) and bool(machine.joints)
 
 
 def shape_of(facts: ReferencedFacts, points: Points) -> ArtefactShape | None:
@@ -89,7 +117,7 @@ def predicted_poses(model: RecordingModel) -> PredictedPoses | None:
     sigma, degrees = found.sigma_of_residuals, found.degrees_of_freedom
     points, rows = model.artefact.points, model.artefact.rows[model.used, 0]
     numbers = np.column_stack([points.measurement, points.point])
-    if isinstance(points.machine, Arm):  # all reflectors that were seen at one pose
+    if joined(points.machine):  # all reflectors that were seen at one pose
         numbers = np.column_stack([points.columns[name] for name in points.machine.columns_of_joints])
     groups = numbered_by_place(model, numbers[rows])
     taken, off, within, inside = [], [], [], []
@@ -126,11 +154,17 @@ def results(result: Result) -> dict[str, Any]:
         shares = (float(inside.mean()) for inside in (predicted.within, predicted.inside))
         shown = dict(zip(_SHARES, shares, strict=True))
         found["held_out"] = {**_figures(predicted.off), **shown, "points": len(predicted.off)}
-    machine = result.artefact.points.machine
+    points, machine = result.artefact.points, result.artefact.points.machine
     rows: dict[str, Any] = {}
-    if isinstance(machine, Arm):
+    if joined(machine):
         rows = {"screws": screws_of(result, machine)} if machine.by_screws else {"rows": rows_of(result, machine)}
-    return {"positions": found, **rows}
+    figures = result.artefact.figures(np.ones(len(points), dtype=bool))
+    poses = [
+        {"measurement": int(points.measurement[own[0]]), "point": int(points.point[own[0]]), "cycles": len(np.unique(own)),
+         **{f"{name}_um": float(of.values[i] / MICROMETRE) for name, of in figures.items()}}
+        for i, own in enumerate(figures["RP"].rows if figures else ())
+    ]  # fmt: skip
+    return {"positions": found, **rows, **({"poses": poses} if poses else {})}
 
 
 _SHARES = ("coordinates_within_U", "points_within_ellipsoid")
@@ -167,7 +201,22 @@ def sections(result: Result) -> list[Section]:
     rows = (
         _rows(data["rows"], result) if "rows" in data else _screws(data["screws"], result) if "screws" in data else None
     )
-    return [section(say("Positions of the tool"), _table(data["positions"], result), _arrows(result), rows)]
+    poses = _poses(data["poses"], result) if "poses" in data else None
+    return [section(say("Positions of the tool"), _table(data, result), poses, _arrows(result), rows)]
+
+
+def _poses(poses: list[dict[str, float]], result: Result) -> Table | None:
+    names, finest = [name for name in ("AP", "RP") if f"{name}_um" in poses[0]], result.noise.expanded / 10
+    rows = (
+        (number(one["point"]), number(one["cycles"]), *(rounded(one[f"{name}_um"], finest)[0] for name in names))
+        for one in poses
+    )
+    note = say(
+        "RP: mean distance from the barycentre of all cycles and three standard deviations. AP: distance of the barycentre "
+        "from the commanded place, where the reference instrument's places are in the frame of the base (ISO 9283)."
+    )
+    values = figure_columns(*map(Verbatim, names), unit=unit("µm"))
+    return table(say("Pose accuracy and repeatability"), [say("Pose"), say("Cycles"), *values], rows, note)
 
 
 _WHEN: Mapping[str, Text] = {
@@ -175,8 +224,8 @@ _WHEN: Mapping[str, Text] = {
 }  # fmt: skip
 
 
-def _table(found: dict[str, Any], result: Result) -> Table | None:
-    noise, rows, notes = result.noise.coordinate.value, [], list[Text]()
+def _table(data: dict[str, Any], result: Result) -> Table | None:
+    found, noise, rows, notes = data["positions"], result.noise.coordinate.value, [], list[Text]()
     for when, words in _WHEN.items():
         if (one := found.get(when)) is None:
             continue
@@ -190,13 +239,15 @@ def _table(found: dict[str, Any], result: Result) -> Table | None:
             count=found["held_out"]["points"],
         )
         notes.append(held_out)
-    iso = say(
-        "This is a calibration. Pose accuracy and repeatability (ISO 9283) need poses that were commanded and repeated."
-    )
+    if "poses" not in data:
+        iso = say(
+            "This is a calibration. Pose accuracy and repeatability (ISO 9283) need poses that were commanded and repeated."
+        )
+        notes.append(iso)
     distances = figure_columns(say("Mean"), say("rms"), say("Largest"), unit=unit("µm"))
     within = figure_columns(say("Coordinates within U"), say("Points within the ellipsoid"), unit=unit("%"))
     title = say("Distance from where the reference instrument saw the point")
-    return table(title, [say("Points"), *distances, *within], rows, *notes, iso)
+    return table(title, [say("Points"), *distances, *within], rows, *notes)
 
 
 def _rows(rows: list[dict[str, float]], result: Result) -> Table | None:

@@ -5,11 +5,12 @@ A sphere without a certified diameter cannot tell an error of the effective styl
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning.candidates import MIDDLE, RelocatedCandidates, VolumeCandidates, upright
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
@@ -27,13 +28,14 @@ from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import numbered
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
-from cmm_uq.machine.model.artefact import Forms, Placings
+from cmm_uq.machine.model.artefact import ArtefactFigure, Forms, Placings
 from cmm_uq.machine.model.artefact_doubt import form_faults
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import expansion, place
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_states import HARMONICS, harmonics, turned_back
 from cmm_uq.maths.geometry import fit_sphere
+from cmm_uq.maths.geometry.enclosing import enclosing_diameter
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 # between a recorded normal and the direction away from the centre; beyond it the normals belong to something else
@@ -85,6 +87,19 @@ class SphereArtefact(Radial):
             self.form, self.directions(points.xyz), diameter - size.nominal if size.certified else None,
             np.array([ball.centre for ball in balls]),
         )  # fmt: skip
+
+    def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
+        """Diameter of the smallest sphere about the centres of all repeats of each place, as orientations of an arm."""
+        points, centres = self.points, self.forms().centres
+        of = np.array([rows[0] for rows in points.rows_of_groups])
+        own = counts[of]
+        each = [np.flatnonzero(own & (points.measurement[of] == number)) for number in np.unique(points.measurement)]
+        each = [groups for groups in each if len(groups) > 1 and centres is not None]
+        if centres is None or not each:
+            return {}
+        rows = np.array([np.resize(np.flatnonzero(np.isin(points.group, groups)), len(points)) for groups in each])
+        values = np.array([enclosing_diameter(centres[groups]) for groups in each])
+        return {"L_Dia": ArtefactFigure(values, rows, np.full(len(each), self.sizes[0].nominal))}
 
     def _take_normals(self, where: str | None) -> None:
         """Normals as recorded, brought to unit length: the probe's errors act along them, and so they are seen exactly."""

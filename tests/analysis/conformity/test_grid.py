@@ -40,6 +40,7 @@ TURNS: dict[str, tuple[Rule, list[tuple[float, str]]]] = {
 
 CASES = [(*test, rule) for test, rule in itertools.product(TESTS, TURNS)]
 AGAIN = {"E0", "E150"}
+OF_ARMS = ("L_Dia", "SPAT", "SPAT maximum", "AP", "RP")
 
 
 def expected(rule: str, room: float) -> str:
@@ -62,7 +63,7 @@ def judged(hand: Hand, standard: str, characteristic: str, rule: str, room: floa
         hand.artefact,
         hand.accuracy,
         "[[conformity]] 1",
-        (BARS, FORMS, LENGTHS, POSITIONING, "FR", "FT", "FA", *own_rule.FIGURES),
+        (BARS, FORMS, LENGTHS, POSITIONING, "FR", "FT", "FA", *OF_ARMS, *own_rule.FIGURES),
         None,
         hand.circumstances,
     )

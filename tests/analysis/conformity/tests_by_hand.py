@@ -23,6 +23,7 @@ from cmm_uq.jobs.tables.machine import ProbeFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import Quantity
+from tests.analysis.conformity.arms_by_hand import ARMS
 from tests.analysis.conformity.own_by_hand import OWN
 from tests.analysis.conformity.recorded import BAR_U, DIAGONALS, MACHINE, NEGLIGIBLE, SEVEN, STATED, bars, gauge, sphere
 from tests.artefacts.test_axis_runs import joined, run
@@ -263,6 +264,16 @@ def own(figure: str) -> Callable[[str], Hand]:
     return made
 
 
+def of_arm(made_by: Callable[[str], tuple[Artefact, Circumstances, float, float, bool]]) -> Callable[[str], Hand]:
+    """A characteristic of an arm or a robot."""
+
+    def made(how: str) -> Hand:
+        artefact, under, value, u, signed = made_by(how)
+        return Hand(artefact, under, {}, value, u, signed)
+
+    return made
+
+
 def diagonals(figure: str) -> Callable[..., Hand]:
     """The runs of ``positioned`` along four body diagonals; on three of them no mean is off, so that E and B are 0."""
 
@@ -416,6 +427,7 @@ TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
     ("ISO 230-4:1996", "F"): circular("F", -11.0, LOBES - 5.0, 0.5 * LOBES - 5.0),
     ("ISO 230-4:2005", "G(b)"): circular("G(b)", 12.0, LOBES, 0.5 * LOBES),
     ("ISO 230-4:2005", "D"): circular("D", 8.0, LOBES + 8.0, 0.5 * LOBES + 8.0),
+    **{name: of_arm(made_by) for name, made_by in ARMS.items()},
     ("VDI/VDE 2617", "E0"): E0,
     ("VDI/VDE 2617-2.1", "U3"): lengths(DIAGONALS),
     ("VDI/VDE 2617-2.1", "U1"): lengths([X, Y, Z]),

@@ -43,7 +43,9 @@ from tests.app.commands.test_budget import dated
 from tests.plugin.packages import OUTSIDE_KINDS, install
 from tests.result_keys import RESULTS, described
 
-NAMES = (*BUILT_IN, "shift_plate", "circular_test")
+NAMES = (
+    *BUILT_IN, "shift_plate", "circular_test", "arm_sphere", "arm_orientations", "arm_lengths", "robot_poses",
+)  # fmt: skip
 
 
 @cache

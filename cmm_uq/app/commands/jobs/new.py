@@ -308,7 +308,7 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
     recorded, today = kind.table.with_recording, dt.datetime.now(tz=dt.UTC).date()
     whole: dict[str, Any] = {
         "job": {"id": id, "date": today} | ({} if origin == MEASURED else {"origin": origin}),
-        "machine": {**({} if "joint" in begin.machine else MACHINE), **begin.machine},
+        "machine": {**({} if begin.machine.keys() & {"joint", "arm"} else MACHINE), **begin.machine},
         "artefact": {"kind": kind.name, **begin.artefact},
         **({"recording": {"file": RECORDING}} if recorded else {}),
         "model": {"effects": list(begin.effects)},

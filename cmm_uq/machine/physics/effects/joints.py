@@ -24,6 +24,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 from cmm_uq.machine.physics.effect import FURTHER, Effect, Family, Harmonic, Parameter, Shape, say
+from cmm_uq.machine.physics.effects import probing
 
 
 class OfRows(Effect):
@@ -245,7 +246,10 @@ _REVOLUTE: tuple[Callable[[str], OfJoint], ...] = (Eccentricity, Ovality, GearEr
 
 
 def effects_of_arm(points: Points) -> dict[str, Effect]:
-    arm, found = arm_of(points), list[Effect]()
+    """Of its joints and its tool, where joints are read, and of what it probes with."""
+    arm, found = arm_of(points), [effect for effect in probing.EFFECTS if effect.name in ("probe_radius", "pre_travel")]
+    if not arm.joints:
+        return {effect.name: effect for effect in found}
     for joint, turns in zip(arm.joints, arm.revolute, strict=True):
         found += [kind(joint) for kind in (*_EVERY, *(_REVOLUTE if turns else (Gain,)))]
     tips = np.unique(tips_of(points), axis=0) if len(points) else None

@@ -1,0 +1,71 @@
+"""Robots by ISO 9283: pose accuracy AP and repeatability RP of poses that were commanded again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from cmm_uq.analysis.conformity.arms import asked, figure_of
+from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.analysis.conformity.standard import Standard
+from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause
+from cmm_uq.analysis.conformity.uncertainty import LENGTH_LINES
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.model.artefact import Artefact
+
+NAME = "ISO 9283:1998"
+POSES, CYCLES = 5, 30
+_FLAT = 0.02  # of the extent of five poses, by which they may lie beside a plane, and one of them beside their middle
+
+
+def poses(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
+    """Five poses, one in the middle of four, all in one plane, each thirty times."""
+    points = artefact.points
+    copied = list(points.copies) if recorded else []
+    cycles: dict[int, list[Floats]] = {}
+    for row in np.flatnonzero(~np.isin(points.group, copied)).tolist():
+        cycles.setdefault(int(points.point[row]), []).append(points.xyz[row])
+    whole = {pose: np.array(each) for pose, each in cycles.items() if len(each) >= CYCLES}
+    what = say("{poses} poses, each commanded {cycles} times", poses=POSES, cycles=CYCLES)
+    found = [asked(what, POSES, len(whole))]
+    plane = say("a pose in the middle of four others, all in one plane")
+    at = [each.mean(axis=0) for each in whole.values()]
+    found.append(Condition(plane, () if any(map(_in_a_plane, _fives(at))) else (plane,)))
+    return tuple(found)
+
+
+def _fives(at: list[Floats]) -> Iterator[Floats]:
+    """Every choice of five places, each of them first once."""
+    for five in combinations(at, POSES):
+        yield from (np.array([five[i], *five[:i], *five[i + 1 :]]) for i in range(POSES))
+
+
+def _in_a_plane(at: Floats) -> bool:
+    off = np.linalg.norm(at[0] - at[1:].mean(axis=0)), np.linalg.svd(at - at.mean(axis=0))[1][2]
+    return bool(max(off) <= _FLAT * float(np.ptp(at, axis=0).max()))
+
+
+_AGAIN = "poses that were commanded again and again"
+STANDARD = Standard(NAME, (
+        figure_of("RP", say("pose repeatability: mean distance from the barycentre and three standard deviations"), _AGAIN,
+                  poses),
+        figure_of("AP", say("pose accuracy: distance of the barycentre from the commanded place"),
+                f'{_AGAIN}, seen in the frame of the base (frame = "base" in [artefact])', poses, lines=LENGTH_LINES),
+    ))  # fmt: skip
+CLAUSES = (
+        Clause("accuracy", say("pose accuracy"), "AP = distance of the barycentre of the places attained from the commanded "
+               "one, of each pose; orientation is not evaluated.", REPORTED, of=("AP",)),
+        Clause("repeatability", say("pose repeatability"), "RP = l̄ + 3·S of the distances l from the barycentre, n − 1, of "
+               "each pose; orientation is not evaluated.", REPORTED, of=("RP",)),
+        Clause("poses", say("poses and cycles"), "Five poses, one in the middle of the others, all in one plane (2 % of "
+               "their extent), thirty cycles. That the plane is that of the cube, and load, speed and warming up, are for the "
+               "procedure.", "five, thirty: as commonly reported; 2 %: this project"),
+        Clause("frame", say("frame of the reference instrument"), "Pose accuracy only where its places are in the frame "
+               "of the base: placed by best fit they would hide a common offset.", CHOSEN, of=("AP",)),
+        Clause("test_uncertainty", say("test uncertainty"), "Of AP the reference instrument's, with alignment to the base; of "
+               "RP what of it changes between cycles.", CHOSEN),
+        ITS_RULE,
+    )  # fmt: skip
