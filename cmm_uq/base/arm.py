@@ -98,7 +98,8 @@ class Arm(Machine):
         return np.column_stack([self.place(xyz, columns), *(columns[name] for name in self.columns_of_joints)])
 
     def coordinates(self, readings: Floats) -> Floats:
-        return self.at(readings[:, 3:]).tool - self.origin_mm if self.joints else super().coordinates(readings)
+        own = readings[:, -len(self.rows) :]
+        return self.at(own).tool - self.origin_mm if self.joints else super().coordinates(readings)
 
     def limits_of(self, axis: str) -> tuple[Floats, str, str]:
         if axis in AXES:
