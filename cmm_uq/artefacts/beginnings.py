@@ -29,7 +29,7 @@ def placed_plate(machine: Machine) -> Points:
     return Points(np.vstack(parts), measurement, point, np.ones(n, dtype=np.int64), machine)
 
 
-PLANE_SHIFTED = Beginning(
+SHIFT_PLATE = Beginning(
     title="Self-calibration of a plane by shifting and turning an uncalibrated plate",
     numbering="One measurement is one placing of the plate; its points are the balls.",
     artefact={
@@ -140,36 +140,60 @@ def _cycles(machine: Machine) -> Points:
 SEATS = Beginning(
     title="Articulated arm, one seat reached again and again (ASME B89.4.22)",
     numbering="One measurement is one seat, point 1; repeat counts the readings, the arm bent otherwise each time.",
-    artefact={"name": "Conical seat"}, effects=(), noise_um=10.0, points=_seats, machine=_ARM,
-    conformity={**_ASME, "characteristic": "SPAT", "limit_um": 60.0}, test=circumstances(u_repeat_um=2.0),
-)  # fmt: skip
+    artefact={"name": "Conical seat"},
+    effects=(),
+    noise_um=10.0,
+    points=_seats,
+    machine=_ARM,
+    conformity={**_ASME, "characteristic": "SPAT", "limit_um": 60.0},
+    test=circumstances(u_repeat_um=2.0),
+)
 _RINGS = ((0.0, 1, 0.0), (22.5, 4, 0.0), (45.0, 8, 22.5), (67.5, 4, 0.0), (90.0, 8, 22.5))
 ARM_SPHERE = Beginning(
     title="Articulated arm, twenty-five points on a sphere in two places (ISO 10360-12)",
     numbering="One measurement is one place of the sphere; its points are the points probed.",
-    artefact=_BALL, effects=("probe_radius",), noise_um=10.0, machine=_ARM,
-    points=lambda machine: _ball(machine, orientations=1, rings=_RINGS), test=circumstances(u_form_um=0.02),
+    artefact=_BALL,
+    effects=("probe_radius",),
+    noise_um=10.0,
+    machine=_ARM,
+    points=lambda machine: _ball(machine, orientations=1, rings=_RINGS),
+    test=circumstances(u_form_um=0.02),
     conformity={**_ISO, "characteristic": "P_Form", "limit_um": 80.0},
-)  # fmt: skip
+)
 ARM_ORIENTATIONS = Beginning(
     title="Articulated arm, a sphere in five orientations in two places (ISO 10360-12)",
     numbering="One measurement is one place of the sphere; repeat counts the orientations of the arm, of five points each.",
-    artefact=_BALL, effects=("probe_radius",), noise_um=10.0, machine=_ARM,
+    artefact=_BALL,
+    effects=("probe_radius",),
+    noise_um=10.0,
+    machine=_ARM,
     points=lambda machine: _ball(machine, orientations=5, rings=((0.0, 1, 0.0), (90.0, 4, 0.0))),
-    conformity={**_ISO, "characteristic": "L_Dia", "limit_um": 120.0}, test=circumstances(u_repeat_um=0.5),
-)  # fmt: skip
+    conformity={**_ISO, "characteristic": "L_Dia", "limit_um": 120.0},
+    test=circumstances(u_repeat_um=0.5),
+)
 ARM_LENGTHS = Beginning(
     title="Articulated arm, lengths on seven lines (ISO 10360-12)",
     numbering="One measurement is one line; its points are the faces, the first met one way and the others the other way.",
-    artefact={"name": "Step gauge", "u_um": "0.3 + L/1000", "cte_per_k": 11.5e-6}, effects=(), noise_um=10.0, machine=_ARM,
-    points=_lines, conformity={**_ISO, "characteristic": "E_Bi", "limit_um": 80.0}, test=_OF_LENGTHS,
+    artefact={"name": "Step gauge", "u_um": "0.3 + L/1000", "cte_per_k": 11.5e-6},
+    effects=(),
+    noise_um=10.0,
+    machine=_ARM,
+    points=_lines,
+    conformity={**_ISO, "characteristic": "E_Bi", "limit_um": 80.0},
+    test=_OF_LENGTHS,
     columns={"reference_mm": ""},
-)  # fmt: skip
-POSES = Beginning(
+)
+ROBOT_POSES = Beginning(
     title="Robot, five poses commanded thirty times and seen by a laser tracker (ISO 9283)",
     numbering="One measurement is one station of the tracker; its points are the poses, repeat counts the cycles.",
-    artefact={"name": "Laser tracker", "u_um": 15.0, "frame": "base"}, effects=(), noise_um=30.0, points=_cycles,
-    machine={"name": "Robot", "arm": {"reach_mm": 1500.0}}, test=circumstances(u_repeat_um=10.0),
+    artefact={"name": "Laser tracker", "u_um": 15.0, "frame": "base"},
+    effects=(),
+    noise_um=30.0,
+    points=_cycles,
+    machine={"name": "Robot", "arm": {"reach_mm": 1500.0}},
+    test=circumstances(u_repeat_um=10.0),
     conformity={"standard": "ISO 9283:1998", "characteristic": "RP", "limit_um": 250.0, "rule": "ISO 14253-1"},
-    columns={f"reference_{axis}_mm": f"Place of the reflector along {axis}, by the reference instrument." for axis in AXES},
-)  # fmt: skip
+    columns={
+        f"reference_{axis}_mm": f"Place of the reflector along {axis}, by the reference instrument." for axis in AXES
+    },
+)

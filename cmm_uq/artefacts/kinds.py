@@ -12,7 +12,7 @@ from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Number, Numbers, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.tables import artefact as tables
-from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue, ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue, ReferencedFacts, UncertifiedFacts
 from cmm_uq.machine.model.kind import AT_20_C, BARS, FORMS, LENGTHS, SIX, Beginning, Kind, circumstances
 
 _HERE = "cmm_uq.artefacts"
@@ -33,6 +33,10 @@ def _kind(
         name, table, f"{_HERE}.{artefact}", f"{_HERE}.{module}:SCREENING", f"{_HERE}.{plan or f'{module}:PLANNING'}",
         f"{_HERE}.{page or module}:PAGE", begin, tested=tested, **further,
     )  # fmt: skip
+
+
+def _also(*names: str) -> dict[str, str]:
+    return {name: f"{_HERE}.beginnings:{name.upper()}" for name in names}
 
 
 class BallbarFacts(ArtefactFacts):
@@ -81,7 +85,7 @@ def _gauge(name: str, class_: str, effects: tuple[str, ...], further: tuple[str,
         plan={"lengths_mm": [20.0, *(100.0 * i for i in range(1, 10))], "repeats": 3}, **others,
     )  # fmt: skip
     artefact, plan = f"gauge_lines:{class_}", f"gauge_lines:{name.upper()}"
-    also = {"arm_lengths": f"{_HERE}.beginnings:ARM_LENGTHS"} if name == "step_gauge" else {}
+    also = _also("arm_lengths") if name == "step_gauge" else {}
     return _kind(
         name, ReferencedFacts, artefact, begin, LENGTHS, *ERRORS, page="gauge_lines_page", plan=plan, begin_also=also
     )
@@ -163,9 +167,7 @@ SPHERE = _kind("sphere", SphereFacts, "spheres.sphere:SphereArtefact", Beginning
     effects=("probe_radius", "probe_lobing"), test=circumstances(u_form_um=0.02), recorded=AT_20_C, plan={"repeats": 1},
     conformity={"standard": "ISO 10360-5:2010", "limit_um": 4.0, "rule": "ISO 14253-1"},
     further=dict.fromkeys((*NORMALS, *APPROACHES), ""), noise_um=0.3,
-), FORMS, "L_Dia", begin_also={
-    name: f"{_HERE}.beginnings:{name.upper()}" for name in ("arm_sphere", "arm_orientations")
-})  # fmt: skip
+), FORMS, "L_Dia", begin_also=_also("arm_sphere", "arm_orientations"))  # fmt: skip
 
 
 class PlaneFacts(ArtefactFacts):
@@ -315,7 +317,7 @@ SHIFT = Kind(
         effects=(), plan={"repeats": 3}, recorded=AT_20_C,
         conformity=_own_rule("linearity", 10.0, 3, 3, 21), test=circumstances(),
     ),
-    begin_also={"shift_plate": f"{_HERE}.beginnings:PLANE_SHIFTED"},
+    begin_also=_also("shift_plate"),
     check=f"{_HERE}.shift.artefact:refuse_unfit", own=f"{_HERE}.shift.artefact:OWN",
     refusal="a shift job cannot be {}: its machine error is a free function, no list of effects",
     instead="cmm-uq report JOB estimates it", tested=("linearity", "straightness", "squareness"),
@@ -338,19 +340,9 @@ ERROR_MAP = Kind(
 )  # fmt: skip
 
 
-class ScannedPlaneFacts(ArtefactFacts):
-    """Nothing of the planes is certified."""
-
-    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
-
-    @property
-    def traced(self) -> bool:
-        return False
-
-
 _SCANNED = f"{_HERE}.optical.planes"
 SCANNED_PLANES = Kind(
-    "scanned_planes", ScannedPlaneFacts, f"{_SCANNED}:ScannedPlanes", page=f"{_SCANNED}:PAGE", begin=f"{_SCANNED}:BEGIN"
+    "scanned_planes", UncertifiedFacts, f"{_SCANNED}:ScannedPlanes", page=f"{_SCANNED}:PAGE", begin=f"{_SCANNED}:BEGIN"
 )
 
 
@@ -365,37 +357,21 @@ _TRACKED = f"{_HERE}.optical.tracked"
 TRACKED_POINTS = Kind(
     "tracked_points", TrackedFacts, f"{_TRACKED}:TrackedPoints", f"{_TRACKED}:SCREENING",
     f"{_HERE}.optical.poses:PLANNING", f"{_TRACKED}:PAGE", f"{_TRACKED}:BEGIN",
-    begin_also={"robot_poses": f"{_HERE}.beginnings:POSES"}, tested=("AP", "RP"),
+    begin_also=_also("robot_poses"), tested=("AP", "RP"),
 )  # fmt: skip
 
 
-class TableSpheresFacts(ArtefactFacts):
-    """Nothing of the spheres is certified; where they are planned to stand on the table."""
-
-    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+class TableSpheresFacts(UncertifiedFacts):
+    """Where the spheres are planned to stand on the table."""
 
     radius_mm: Length = key(200.0, "Distance of both spheres from the table's axis, for a plan.")
     height_mm: Length = key(200.0, "By how much sphere B lies higher than sphere A along the axis, for a plan.")
     low_mm: Position = key(0.0, "Height of sphere A above the stated point of the table's axis, for a plan.")
 
-    @property
-    def traced(self) -> bool:
-        return False
-
-
-class SeatFacts(ArtefactFacts):
-    """Nothing of the seat is certified."""
-
-    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
-
-    @property
-    def traced(self) -> bool:
-        return False
-
 
 _SEAT = f"{_HERE}.spheres.seat"
 SEAT = Kind(
-    "seat", SeatFacts, f"{_SEAT}:Seat", f"{_SEAT}:SCREENING", page=f"{_SEAT}:PAGE", begin=f"{_HERE}.beginnings:SEATS",
+    "seat", UncertifiedFacts, f"{_SEAT}:Seat", f"{_SEAT}:SCREENING", page=f"{_SEAT}:PAGE", begin=f"{_HERE}.beginnings:SEATS",
     instead="Choose seats near the base, in the middle of the reach and far out; bend the arm otherwise for each reading",
     tested=("SPAT", "SPAT maximum"),
 )  # fmt: skip

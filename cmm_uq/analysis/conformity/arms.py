@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity import decided, own_rule
 from cmm_uq.analysis.conformity.as_recorded import repeats_of_gauge, supplemented
-from cmm_uq.analysis.conformity.own_rule import form_unstated
+from cmm_uq.analysis.conformity.own_rule import figure_of, form_unstated
 from cmm_uq.analysis.conformity.plan_conditions import apart, most_apart, nominals, sphere_points
 from cmm_uq.analysis.conformity.plans import ISO_10360_2, Condition, SpherePlan
 from cmm_uq.analysis.conformity.standard import (
@@ -30,7 +30,6 @@ from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Cla
 from cmm_uq.analysis.conformity.uncertainty import (
     FORM_LINES,
     LENGTH_LINES,
-    REPEAT_LINES,
     SIZE_LINES,
     causes_of_lengths,
 )
@@ -110,8 +109,9 @@ def oriented(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     """Five orientations of five points each, in two places of the sphere."""
     what = say(
         "{orientations} orientations of {points} points each, in two places a quarter of the reach apart",
-        orientations=ORIENTATIONS, points=ORIENTED_POINTS,
-    )  # fmt: skip
+        orientations=ORIENTATIONS,
+        points=ORIENTED_POINTS,
+    )
     return (
         _two_places(artefact, what, ORIENTATIONS, ORIENTED_POINTS, recorded=recorded),
         _reach(artefact)[1],
@@ -124,10 +124,15 @@ def seats(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     whole = [own for own in _groups(points, recorded=recorded).values() if len(own) >= READINGS]
     away = [float(np.linalg.norm(points.machine_xyz[np.isin(points.group, own)].mean(axis=0))) / reach for own in whole]
     lacks = [
-        say("{readings} readings of a seat {low:.0f} to {high:.0f} % of the reach from the base", readings=READINGS,
-            low=100 * low, high=min(100 * high, 100.0))
-        for low, high in ZONES if not any(low <= one < high for one in away)
-    ]  # fmt: skip
+        say(
+            "{readings} readings of a seat {low:.0f} to {high:.0f} % of the reach from the base",
+            readings=READINGS,
+            low=100 * low,
+            high=min(100 * high, 100.0),
+        )
+        for low, high in ZONES
+        if not any(low <= one < high for one in away)
+    ]
     what = say("{readings} readings in each of three seats: near, in the middle and far out", readings=READINGS)
     return (Condition(what, tuple(lacks)), stated)
 
@@ -180,8 +185,10 @@ def arm_lengths(chosen: decided.Chosen, artefact: Artefact, *, recorded: bool) -
             if len(often := of[times >= REPEATS]) >= ON_LINE:
                 whole[measurement] = line
                 longest = max(longest, float(found.lengths[each[here & (each[:, 0] == often[-1]), 2]].max()))
-    near = {i: {j for j, other in whole.items() if j != i and line.holds(other.point[None], other.along[None])[0]}
-            for i, line in whole.items()}  # fmt: skip
+    near = {
+        i: {j for j, other in whole.items() if j != i and line.holds(other.point[None], other.along[None])[0]}
+        for i, line in whole.items()
+    }
     taken = most_apart(near)
     what = say("{lines} lines of {count} lengths, each {repeats} times", lines=LINES, count=ON_LINE, repeats=REPEATS)
     least = say("longest length at least {share:.0f} % of the measuring range, twice the reach", share=100 * LONGEST)
@@ -226,13 +233,21 @@ def bars(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     return (
         asked(say("{count} positions of the bars", count=BARS), BARS, len(taken)),
         *(
-            asked(say("{count} of them of a bar of {low:.0f} to {high:.0f} % of the reach", count=EITHER,
-                       low=100 * low, high=100 * high), EITHER, count)
+            asked(
+                say(
+                    "{count} of them of a bar of {low:.0f} to {high:.0f} % of the reach",
+                    count=EITHER,
+                    low=100 * low,
+                    high=100 * high,
+                ),
+                EITHER,
+                count,
+            )
             for (low, high), count in zip((SHORT, LONG), counts, strict=True)
         ),
         _directions([ends[i][0][1] - ends[i][0][0] for i in taken], _up(artefact)),
         stated,
-    )  # fmt: skip
+    )
 
 
 def twice_rms(test: Test) -> Statement:
@@ -244,18 +259,19 @@ def twice_rms(test: Test) -> Statement:
     test.refuse_without_uncertainty(float(u.min()), "u_um")
     value, whole = (2 * float(np.sqrt(np.sum(x**2) / (own.sum() - 1))) for x in (found.errors[own] / MICROMETRE, u))
     length = float(found.lengths[own].mean())
-    item = test.decided(value, whole, test.limit_um(length), signed=False, length_mm=length,
-                        set_aside=bool(test.set_aside(found.rows[own]).any()))  # fmt: skip
+    item = test.decided(
+        value,
+        whole,
+        test.limit_um(length),
+        signed=False,
+        length_mm=length,
+        set_aside=bool(test.set_aside(found.rows[own]).any()),
+    )
     what = say("u is twice the root mean square of those of the lengths, which no correlation of them exceeds.")
     remark = what if whole > 0 else NOT_STATED
-    return test.stated(say("twice the root mean square of the errors of length"), say("figures"), (item,), [remark],
-                       signed=False)  # fmt: skip
-
-
-def figure_error(test: Test, *, figure: str, title: Text, what: str, lines: tuple[str, ...]) -> Statement:
-    figures = test.artefact.figures(own_rule.counting(test.recorded.points))
-    test.refuse_nothing_measured(figure in figures, what)
-    return own_rule.figure_decided(test, figures[figure], title, say("places"), lines, of_two_sides=False)
+    return test.stated(
+        say("twice the root mean square of the errors of length"), say("figures"), (item,), [remark], signed=False
+    )
 
 
 def _gauge(test: Test) -> tuple[Condition, ...]:
@@ -263,32 +279,40 @@ def _gauge(test: Test) -> tuple[Condition, ...]:
     return repeats_of_gauge(beside, test.indications(), REPEATS, ISO_10360_2.shortest_mm) if beside else ()
 
 
-def figure_of(
-    name: str, title: Text, what: str, conditions: Callable[..., tuple[Condition, ...]], *also: str,
-    lines: tuple[str, ...] = REPEAT_LINES,
-) -> Characteristic:  # fmt: skip
-    figure = also[0] if also else name
-    decides = partial(figure_error, figure=figure, title=title, what=what, lines=lines)
-    of_length = lines == LENGTH_LINES
-    return Characteristic(name, figure, decides, conditions, length_unstated if of_length else lambda artefact: None,
-                          needs=None if of_length else "u_repeat_um", lines=lines, also=also)  # fmt: skip
-
-
 def _of_sphere(
-    name: str, errors: Callable[[Test], Statement], lines: tuple[str, ...], plan: SpherePlan, repeats: int, places: int,
+    name: str,
+    errors: Callable[[Test], Statement],
+    lines: tuple[str, ...],
+    plan: SpherePlan,
+    repeats: int,
+    places: int,
     *also: str,
-) -> Characteristic:  # fmt: skip
+) -> Characteristic:
     unstated = form_unstated if lines == FORM_LINES else length_unstated
-    return Characteristic(name, FORMS, errors, partial(spheres, plan, repeats, places), unstated,
-                          partial(diameter_allowed, plan=plan), also, lines=lines)  # fmt: skip
+    return Characteristic(
+        name,
+        FORMS,
+        errors,
+        partial(spheres, plan, repeats, places),
+        unstated,
+        partial(diameter_allowed, plan=plan),
+        also,
+        lines=lines,
+    )
 
 
 def _lengths(name: str, both: bool) -> Characteristic:
     chosen = of_sides(both)
     return Characteristic(
-        name, LENGTHS, partial(decided.errors_of_indication, chosen=chosen), partial(arm_lengths, chosen), length_unstated,
-        asks=_gauge if both else lambda test: (), beside=supplemented if both else None, lines=LENGTH_LINES,
-    )  # fmt: skip
+        name,
+        LENGTHS,
+        partial(decided.errors_of_indication, chosen=chosen),
+        partial(arm_lengths, chosen),
+        length_unstated,
+        asks=_gauge if both else lambda test: (),
+        beside=supplemented if both else None,
+        lines=LENGTH_LINES,
+    )
 
 
 _ISO_10360_12, _B89_4_22 = NAMES
@@ -315,7 +339,7 @@ CLAUSES = {
     _ISO_10360_12: (
         Clause("scope", say("scope"), "Articulated arms with contacting probes; line scanners (its annex E) are not tested.",
                "its publisher's abstract", True),
-        Clause("sphere", say("form and size of a sphere"), "25 points on a sphere in two places, about the least-squares "
+        Clause("ball", say("form and size of a sphere"), "25 points on a sphere in two places, about the least-squares "
                "sphere; each place is decided.", _MAKER),
         Clause("places", say("places of the sphere"), "A quarter of the reach apart at least; points over a hemisphere within "
                "45°; sphere of 10 to 51 mm.", CHOSEN),

@@ -7,7 +7,7 @@ what is tested. What a complete test consists of is the laboratory's too, and wi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity import positioning
 from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Standard, Test
+from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Standard, Test, length_unstated
 from cmm_uq.analysis.conformity.statement import Statement, least_favourable
 from cmm_uq.analysis.conformity.uncertainty import (
     FORM_LINES,
@@ -225,6 +225,36 @@ def _unstated(lines: tuple[str, ...], artefact: ArtefactFacts) -> str | None:
     keys = [value.u_key for value in artefact.certified_values if value.u_key]
     known = any(getattr(artefact, key, None) for key in keys)
     return None if known or not keys or lines != LENGTH_LINES or not artefact.traced else keys[0]
+
+
+def figure_error(test: Test, *, figure: str, title: Text, what: str, lines: tuple[str, ...]) -> Statement:
+    """A figure of the artefact, everywhere that it has a value, against the limit of a standard."""
+    figures = test.artefact.figures(counting(test.recorded.points))
+    test.refuse_nothing_measured(figure in figures, what)
+    return figure_decided(test, figures[figure], title, say("places"), lines, of_two_sides=False)
+
+
+def figure_of(
+    name: str,
+    title: Text,
+    what: str,
+    conditions: Callable[..., tuple[Condition, ...]],
+    *also: str,
+    lines: tuple[str, ...] = REPEAT_LINES,
+) -> Characteristic:
+    figure = also[0] if also else name
+    decides = partial(figure_error, figure=figure, title=title, what=what, lines=lines)
+    of_length = lines == LENGTH_LINES
+    return Characteristic(
+        name,
+        figure,
+        decides,
+        conditions,
+        length_unstated if of_length else lambda artefact: None,
+        needs=None if of_length else "u_repeat_um",
+        lines=lines,
+        also=also,
+    )
 
 
 STANDARD = Standard(

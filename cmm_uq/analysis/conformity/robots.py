@@ -7,7 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.arms import asked, figure_of
+from cmm_uq.analysis.conformity.arms import asked
+from cmm_uq.analysis.conformity.own_rule import figure_of
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import Standard
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause
@@ -49,23 +50,61 @@ def _in_a_plane(at: Floats) -> bool:
 
 
 _AGAIN = "poses that were commanded again and again"
-STANDARD = Standard(NAME, (
-        figure_of("RP", say("pose repeatability: mean distance from the barycentre and three standard deviations"), _AGAIN,
-                  poses),
-        figure_of("AP", say("pose accuracy: distance of the barycentre from the commanded place"),
-                f'{_AGAIN}, seen in the frame of the base (frame = "base" in [artefact])', poses, lines=LENGTH_LINES),
-    ))  # fmt: skip
+STANDARD = Standard(
+    NAME,
+    (
+        figure_of(
+            "RP",
+            say("pose repeatability: mean distance from the barycentre and three standard deviations"),
+            _AGAIN,
+            poses,
+        ),
+        figure_of(
+            "AP",
+            say("pose accuracy: distance of the barycentre from the commanded place"),
+            f'{_AGAIN}, seen in the frame of the base (frame = "base" in [artefact])',
+            poses,
+            lines=LENGTH_LINES,
+        ),
+    ),
+)
 CLAUSES = (
-        Clause("accuracy", say("pose accuracy"), "AP = distance of the barycentre of the places attained from the commanded "
-               "one, of each pose; orientation is not evaluated.", REPORTED, of=("AP",)),
-        Clause("repeatability", say("pose repeatability"), "RP = l̄ + 3·S of the distances l from the barycentre, n − 1, of "
-               "each pose; orientation is not evaluated.", REPORTED, of=("RP",)),
-        Clause("poses", say("poses and cycles"), "Five poses, one in the middle of the others, all in one plane (2 % of "
-               "their extent), thirty cycles. That the plane is that of the cube, and load, speed and warming up, are for the "
-               "procedure.", "five, thirty: as commonly reported; 2 %: this project"),
-        Clause("frame", say("frame of the reference instrument"), "Pose accuracy only where its places are in the frame "
-               "of the base: placed by best fit they would hide a common offset.", CHOSEN, of=("AP",)),
-        Clause("test_uncertainty", say("test uncertainty"), "Of AP the reference instrument's, with alignment to the base; of "
-               "RP what of it changes between cycles.", CHOSEN),
-        ITS_RULE,
-    )  # fmt: skip
+    Clause(
+        "accuracy",
+        say("pose accuracy"),
+        "AP = distance of the barycentre of the places attained from the commanded "
+        "one, of each pose; orientation is not evaluated.",
+        REPORTED,
+        of=("AP",),
+    ),
+    Clause(
+        "repeatability",
+        say("pose repeatability"),
+        "RP = l̄ + 3·S of the distances l from the barycentre, n − 1, of each pose; orientation is not evaluated.",
+        REPORTED,
+        of=("RP",),
+    ),
+    Clause(
+        "poses",
+        say("poses and cycles"),
+        "Five poses, one in the middle of the others, all in one plane (2 % of "
+        "their extent), thirty cycles. That the plane is that of the cube, and load, speed and warming up, are for the "
+        "procedure.",
+        "five, thirty: as commonly reported; 2 %: this project",
+    ),
+    Clause(
+        "frame",
+        say("frame of the reference instrument"),
+        "Pose accuracy only where its places are in the frame "
+        "of the base: placed by best fit they would hide a common offset.",
+        CHOSEN,
+        of=("AP",),
+    ),
+    Clause(
+        "test_uncertainty",
+        say("test uncertainty"),
+        "Of AP the reference instrument's, with alignment to the base; of RP what of it changes between cycles.",
+        CHOSEN,
+    ),
+    ITS_RULE,
+)

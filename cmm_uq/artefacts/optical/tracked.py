@@ -160,10 +160,11 @@ def results(result: Result) -> dict[str, Any]:
         rows = {"screws": screws_of(result, machine)} if machine.by_screws else {"rows": rows_of(result, machine)}
     figures = result.artefact.figures(np.ones(len(points), dtype=bool))
     poses = [
-        {"measurement": int(points.measurement[own[0]]), "point": int(points.point[own[0]]), "cycles": len(np.unique(own)),
-         **{f"{name}_um": float(of.values[i] / MICROMETRE) for name, of in figures.items()}}
+        {name: int(getattr(points, name)[own[0]]) for name in ("measurement", "point")}
+        | {"cycles": len(np.unique(own))}
+        | {f"{name}_um": float(of.values[i] / MICROMETRE) for name, of in figures.items()}
         for i, own in enumerate(figures["RP"].rows if figures else ())
-    ]  # fmt: skip
+    ]
     return {"positions": found, **rows, **({"poses": poses} if poses else {})}
 
 
@@ -220,8 +221,10 @@ def _poses(poses: list[dict[str, float]], result: Result) -> Table | None:
 
 
 _WHEN: Mapping[str, Text] = {
-    "before": say("as recorded, placed"), "after": say("after the fitted model"), "held_out": say("held out, predicted"),
-}  # fmt: skip
+    "before": say("as recorded, placed"),
+    "after": say("after the fitted model"),
+    "held_out": say("held out, predicted"),
+}
 
 
 def _table(data: dict[str, Any], result: Result) -> Table | None:
@@ -283,13 +286,16 @@ def _arrows(result: Result) -> Block:
     before, after = alike(*(float(np.linalg.norm(each, axis=1).max()) for each in arrows))
     first, second = (Verbatim(AXES[axis].upper()) for axis in axes)
     return vector_plot(
-        xyz[:, axes], tuple(zip((_WHEN["before"], _WHEN["after"]), arrows, strict=True)),
+        xyz[:, axes],
+        tuple(zip((_WHEN["before"], _WHEN["after"]), arrows, strict=True)),
         axis_labels=(say("{axis} / mm", axis=first), say("{axis} / mm", axis=second)),
         caption=say("Indicated less seen places, in the plane of {first} and {second}.", first=first, second=second),
         alternative=say(
-            "Arrows of up to {before} µm as recorded, up to {after} µm after the fitted model.", before=before, after=after
+            "Arrows of up to {before} µm as recorded, up to {after} µm after the fitted model.",
+            before=before,
+            after=after,
         ),
-    )  # fmt: skip
+    )
 
 
 PAGE = Page(sections, results)
@@ -327,9 +333,13 @@ _ROBOT_ROWS = (  # a, α, d, θ, travel of a robot of six joints that reaches 1.
 )
 # without what a place says nothing of: the base, rows of parallel axes, and the last joint beside the tool
 _DETERMINED = (
-    *(f"zero_q{i}" for i in range(2, 6)), *(f"length_q{i}" for i in range(1, 6)), *(f"twist_q{i}" for i in range(1, 6)),
-    *(f"offset_q{i}" for i in range(3, 6)), "parallelism_q2", "tool_offset",
-)  # fmt: skip
+    *(f"zero_q{i}" for i in range(2, 6)),
+    *(f"length_q{i}" for i in range(1, 6)),
+    *(f"twist_q{i}" for i in range(1, 6)),
+    *(f"offset_q{i}" for i in range(3, 6)),
+    "parallelism_q2",
+    "tool_offset",
+)
 BEGIN = Beginning(
     title="Robot measured by a laser tracker",
     numbering="One measurement is one station of the tracker; its points are the poses.",

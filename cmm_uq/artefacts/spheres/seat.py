@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
-from cmm_uq.artefacts.kinds import SeatFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.points import AXES, Floats, Points
@@ -21,6 +20,7 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Section, Table, columns, figure_columns
 from cmm_uq.certificate.plots.residuals import deviations_plot
 from cmm_uq.certificate.result import Page, Result
+from cmm_uq.jobs.tables.artefact import UncertifiedFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.maths.inference.linear_model import Freedoms
@@ -36,7 +36,7 @@ class Seat(Artefact):
     kind = "seat"
     title = say("Seat")
 
-    def __init__(self, facts: SeatFacts, points: Points, *, where: str | None = None) -> None:
+    def __init__(self, facts: UncertifiedFacts, points: Points, *, where: str | None = None) -> None:
         self.points, self.placings = points, Placings.of(points.measurement)
         self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
         self._axes = np.broadcast_to(np.eye(3), (len(points), 3, 3))
@@ -84,7 +84,7 @@ class Seat(Artefact):
         return {name: ArtefactFigure(np.array(of), rows, lengths) for name, of in values.items()}
 
 
-def shape_of(facts: SeatFacts, points: Points) -> ArtefactShape | None:
+def shape_of(facts: UncertifiedFacts, points: Points) -> ArtefactShape | None:
     extent = float(np.ptp(points.xyz, axis=0).max(initial=0.0))
     rows = Placings.of(points.measurement).rows
     return ArtefactShape(rows, _about_median, np.nan, extent, False, (), np.zeros((len(points), 0)))
@@ -106,13 +106,15 @@ def results(result: Result) -> dict[str, Any]:
     return {
         "seats": [
             {
-                "measurement": int(points.measurement[rows[0]]), "readings": len(np.unique(rows)),
-                "distance_mm": float(spat.lengths[i]), "SPAT_um": float(spat.values[i]) / MICROMETRE,
+                "measurement": int(points.measurement[rows[0]]),
+                "readings": len(np.unique(rows)),
+                "distance_mm": float(spat.lengths[i]),
+                "SPAT_um": float(spat.values[i]) / MICROMETRE,
                 "largest_um": float(largest.values[i]) / MICROMETRE,
             }
             for i, rows in enumerate(spat.rows)
         ]
-    }  # fmt: skip
+    }
 
 
 def sections(result: Result) -> list[Section]:
@@ -123,32 +125,47 @@ def sections(result: Result) -> list[Section]:
 def _table(result: Result) -> Table:
     rows = [
         (
-            number(one["measurement"]), number(one["readings"]), number(one["distance_mm"], ".0f"),
+            number(one["measurement"]),
+            number(one["readings"]),
+            number(one["distance_mm"], ".0f"),
             *(rounded(one[name], result.noise.expanded / 10)[0] for name in ("SPAT_um", "largest_um")),
         )
         for one in results(result)["seats"]
-    ]  # fmt: skip
+    ]
     note = say(
         "Of the distances of the readings from their mean, as recorded: twice the standard deviation (n − 1), and the "
         "largest. The distance is that of the seat from the base of the arm."
     )
-    heads = columns([
-        say("Seat"), *figure_columns(say("Readings")), *figure_columns(say("Distance"), unit=unit("mm")),
-        *figure_columns(say("2 s"), say("Largest"), unit=unit("µm")),
-    ])  # fmt: skip
+    heads = columns(
+        [
+            say("Seat"),
+            *figure_columns(say("Readings")),
+            *figure_columns(say("Distance"), unit=unit("mm")),
+            *figure_columns(say("2 s"), say("Largest"), unit=unit("µm")),
+        ]
+    )
     return Table(say("Articulation"), heads, tuple(rows), (note,))
 
 
 def _over(result: Result, seat: Seat, k: int) -> Any:
     before, axis = seat.deviations()[:, k] / MICROMETRE, _AXES[AXES[k]]
-    caption = say("{axis} of each reading about the mean of its seat, with U (k = {k}).", axis=axis,
-                  k=number(result.noise.coverage_factor, ".2f"))  # fmt: skip
+    caption = say(
+        "{axis} of each reading about the mean of its seat, with U (k = {k}).",
+        axis=axis,
+        k=number(result.noise.coverage_factor, ".2f"),
+    )
     return deviations_plot(
-        result, before, say("{count} readings deviate", count=len(before)),
-        say("{axis} from the mean of their seat", axis=axis), position=seat.points.repeat,
-        after_um=result.residuals[k::3] / MICROMETRE, flagged=result.flagged[k::3], reference=say("mean of the seat"),
-        position_label=say("Reading of the seat, in order"), caption=caption,
-    )  # fmt: skip
+        result,
+        before,
+        say("{count} readings deviate", count=len(before)),
+        say("{axis} from the mean of their seat", axis=axis),
+        position=seat.points.repeat,
+        after_um=result.residuals[k::3] / MICROMETRE,
+        flagged=result.flagged[k::3],
+        reference=say("mean of the seat"),
+        position_label=say("Reading of the seat, in order"),
+        caption=caption,
+    )
 
 
 PAGE = Page(sections, results)

@@ -219,6 +219,16 @@ class ArtefactFacts(JobTable):
         return self.certified
 
 
+class UncertifiedFacts(ArtefactFacts):
+    """Nothing of what is measured is certified."""
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    @property
+    def traced(self) -> bool:
+        return False
+
+
 class ReferencedFacts(ArtefactFacts):
     """``[artefact]`` of a kind whose certified figures stand in the recording.
 
