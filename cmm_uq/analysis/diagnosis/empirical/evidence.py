@@ -21,6 +21,8 @@ from cmm_uq.base.units import MICROMETRE
 
 _SMALLEST = 0.4  # smallest rms of a function that is considered, over the noise
 _FOLLOWED, IMPROBABLE = 40, 1e-3  # versions that a prediction averages, and what a version adds to it at least
+# Part of the largest log evidence over nothing from which on a form may come first between its nodes, and how many of these
+_BETWEEN, _NODES = 0.8, 6
 _SINGULAR = 1e-9  # part of the largest singular value below which another counts as zero
 
 
@@ -132,20 +134,45 @@ class FunctionFit:
         log[rms * largest < _SMALLEST] = -np.inf  # even the largest would not show
         return log + family.log_prior - np.log(AMPLITUDES), sizes
 
+    def refined(self) -> FunctionFit:
+        """The same with finer nodes about those that carry a form that may be the most probable.
+
+        Between two nodes of its grid a form of large size loses more of its evidence than others are behind it.
+        """
+        best = max(float(log.max(initial=-np.inf)) for log, _ in self.evidence)
+        families, known = list[FunctionFamily](), list[tuple[Floats, Floats]]()
+        for family, (log, sizes) in zip(self.families, self.evidence, strict=True):
+            of_node, most = log.max(axis=1), float(log.max(initial=-np.inf))
+            likely = np.argsort(-of_node, kind="stable")[:_NODES]
+            likely = likely[of_node[likely] > most + np.log(IMPROBABLE)]
+            finer = family.finer(likely) if most - self.nothing > _BETWEEN * (best - self.nothing) else None
+            if finer is not None:
+                families.append(finer)
+                known.append(self.of_family(finer))
+                family = family.without(likely)
+                log, sizes = (np.delete(each, likely, axis=0) for each in (log, sizes))
+            if len(log):
+                families.append(family)
+                known.append((log, sizes))
+        found = replace(self, families=families)
+        found.__dict__["evidence"] = known
+        return found
+
     @cached_property
     def total(self) -> float:
         return float(scipy.special.logsumexp([scipy.special.logsumexp(log) for log, _ in self.evidence]))
 
     def versions(self, most: int = _FOLLOWED) -> list[FunctionVersion]:
-        """The most probable, with their probability among all functions."""
-        logs = np.concatenate([log.ravel() for log, _ in self.evidence])
-        starts = np.cumsum([0, *(log.size for log, _ in self.evidence)])
+        """The most probable, with their probability among all functions; of a finer grid the best in each node's place."""
+        cells = [_by_cell(log, family.cell) for family, (log, _) in zip(self.families, self.evidence, strict=True)]
+        logs = np.concatenate([log.ravel() for log, _ in cells])
+        starts = np.cumsum([0, *(log.size for log, _ in cells)])
         first = np.argpartition(-logs, min(most, len(logs) - 1))[:most]
         found = []
         for i in first[np.argsort(-logs[first], kind="stable")].tolist():
             owner = int(np.searchsorted(starts, i, side="right")) - 1
-            index, size = divmod(i - int(starts[owner]), AMPLITUDES)
-            probability = float(np.exp(logs[i] - self.total))
+            place, size = divmod(i - int(starts[owner]), AMPLITUDES)
+            index, probability = int(cells[owner][1][place, size]), float(np.exp(logs[i] - self.total))
             found.append(FunctionVersion(owner, index, float(self.evidence[owner][1][index, size]), probability))
         return found
 
@@ -157,6 +184,15 @@ class FunctionFit:
         square = float(self.left @ self.left - mean @ (z.T @ self.left))
         sigma = max(float(np.sqrt(max(square, 0.0) / max(self.degrees, 1))), self.least)
         return mean, np.asarray(inverse * sigma**2), sigma
+
+
+def _by_cell(log: Floats, cell: Ints | None) -> tuple[Floats, Ints]:
+    """Of functions with logs (K, a) their sums by cells (C, a), and which of each is the most probable, (C, a)."""
+    if cell is None:
+        return log, np.broadcast_to(np.arange(len(log))[:, None], log.shape)
+    starts = np.flatnonzero(np.diff(cell, prepend=-1))
+    best = [part.argmax(axis=0) + start for part, start in zip(np.split(log, starts[1:]), starts, strict=True)]
+    return np.logaddexp.reduceat(log, starts, axis=0), np.array(best)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,9 @@ about the most probable nodes it is divided.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -22,6 +23,7 @@ SMOOTH, ROUGH = "smooth", "rough"  # of no form in particular, with a slope ever
 PRODUCT, BOWL = "product", "bowl"  # forms of two readings
 _STEPS, _HINGES, _PLACES, _SATURATES, _PHASES = 40, 19, 24, 15, 12
 _WIDTHS, _SOFT, _REACHES, _DEAD = (0.03, 0.06, 0.12), (0.04, 0.08, 0.16), (0.05, 0.1, 0.2, 0.4), 6
+_CENTRES = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of a dead zone, in halves of the range
 # Frequencies, in periods over the range: less than one is a curve, and a sawtooth of less than two a step
 _WHOLE, _SEVERAL, _BETWEEN, _SINES, _TEETH = 1.0, 2.0, 0.35, 25.0, 12.0
 Function = Callable[[Floats, Floats], Floats]
@@ -85,27 +87,27 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
     )
     yield _even(settles, ("reach",), reach, lambda c, s: np.exp((c - high) / s[:, 0]), f"exp((c - {high!r})/reach)")
     period = span / np.arange(_WHOLE, min(_SINES, 0.5 * len(distinct)), _BETWEEN)
-    if len(period) > 1:
-        yield _even("sine", ("period",), period, _waves, "cos(2*pi*c/period);sin(2*pi*c/period)")
+    for orders in ((1,), (1, 2)) if len(period) > 1 else ():
+        waves = [f"{wave}({2 * order}*pi*c/period)" for order in orders for wave in ("cos", "sin")]
+        yield _even("sine", ("period",), period, partial(_waves, orders), ";".join(waves))
     period = span / np.arange(_SEVERAL, min(_TEETH, 0.25 * len(distinct)), _BETWEEN)
     if len(period) > 1:
         grid, apart = _grid(period, np.arange(_PHASES) / _PHASES)
         grid[:, 1], apart[:, 1] = grid[:, 1] * grid[:, 0], apart[:, 1] * grid[:, 0]
         yield ClosedForm("sawtooth", ("period", "at"), grid, apart, _teeth, "2/pi*atan(tan(pi*(c - at)/period))")
-    zero = 0.0 if low < 0 < high else middle
     width = half * np.arange(1, _DEAD + 1) / (_DEAD + 1)
     yield _even(
         "dead_zone",
-        ("width",),
-        width,
-        lambda c, s: np.sign(c - zero) * np.maximum(np.abs(c - zero) - s[:, 0], 0) / span,
-        f"sign(c - {zero!r})*max(abs(c - {zero!r}) - width, 0)/{span!r}",
+        ("at", "width"),
+        (np.unique(np.append(middle + half * np.array(_CENTRES), np.clip(0.0, low, high))), width),
+        lambda c, s: np.sign(c - s[:, 0]) * np.maximum(np.abs(c - s[:, 0]) - s[:, 1], 0) / span,
+        f"sign(c - at)*max(abs(c - at) - width, 0)/{span!r}",
     )
 
 
-def _waves(c: Floats, s: Floats) -> Floats:
-    turn = 2 * np.pi * c / s[:, 0]
-    return np.stack([np.cos(turn), np.sin(turn)], axis=2)
+def _waves(orders: Sequence[int], c: Floats, s: Floats) -> Floats:
+    turns = [2 * order * np.pi * c / s[:, 0] for order in orders]
+    return np.stack([wave(turn) for turn in turns for wave in (np.cos, np.sin)], axis=2)
 
 
 def _teeth(c: Floats, s: Floats) -> Floats:
@@ -137,7 +139,7 @@ _ROUGH, _GRID, _KEPT = (
 )  # lengths, in parts of the range; nodes; part of what shows that is kept
 _TURNED = 0.3  # how readily a curve of rotation is thought of, beside a displacement
 _SEEN = 1e-9  # mm, length of columns for a size that physics allows
-_PARTS = np.array([-0.5, -0.375, -0.25, -0.125, 0.0, 0.125, 0.25, 0.375, 0.5])  # of the distance of two nodes
+_PARTS = (np.arange(9) - 4) / 9  # of the distance of two nodes
 
 
 @dataclass(frozen=True)
@@ -165,25 +167,36 @@ class FunctionFamily:
     shaped: ClosedForm | None = None
     seen: Seen | None = None
     formula: str = ""
+    cell: Ints | None = None  # (K,) in the place of which node each stands, in their order, where a grid was made finer
 
     @property
     def parameters(self) -> tuple[str, ...]:
         return self.shaped.parameters if self.shaped else ()
 
-    def divided(self, likely: Ints) -> FunctionFamily:
-        """The same form with finer nodes about some that are likely (l,)."""
+    def without(self, nodes: Ints) -> FunctionFamily:
+        """All functions but some (l,)."""
+        form = self.shaped
+        if form is not None:
+            form = replace(form, shapes=np.delete(form.shapes, nodes, 0), apart=np.delete(form.apart, nodes, 0))
+        columns, values = (np.delete(each, nodes, axis=1) for each in (self.columns, self.values))
+        return replace(self, columns=columns, values=values, shaped=form)
+
+    def finer(self, nodes: Ints) -> FunctionFamily | None:
+        """Finer nodes in the place of some (l,) of a form's grid, together as probable; ``None`` where there is no grid."""
         form, seen = self.shaped, self.seen
         if form is None or seen is None or not form.parameters:
-            return self
+            return None
         part = np.stack(np.meshgrid(*[_PARTS] * len(form.parameters), indexing="ij"), axis=-1).reshape(
             -1, len(form.parameters)
         )
-        shapes = (form.shapes[likely][:, None] + part * form.apart[likely][:, None]).reshape(-1, part.shape[1])
+        shapes = (form.shapes[nodes][:, None] + part * form.apart[nodes][:, None]).reshape(-1, part.shape[1])
         lengths = [k for k, name in enumerate(form.parameters) if name in ("width", "reach", "period")]
         kept = np.all(shapes[:, lengths] > 0, axis=1)
-        apart = np.repeat(form.apart[likely], len(part), axis=0) / len(_PARTS)
-        finer = replace(form, shapes=shapes[kept], apart=apart[kept])
-        return _of_form(self.term, finer, seen, self.covariate, self.log_prior)
+        apart = np.repeat(form.apart[nodes], len(part), axis=0) / len(_PARTS)
+        divided = replace(form, shapes=shapes[kept], apart=apart[kept])
+        log_prior = self.log_prior - float(np.log(len(part)))
+        cell = np.repeat(np.arange(len(nodes)), len(part))[kept]
+        return replace(_of_form(self.term, divided, seen, self.covariate, log_prior), seen=None, cell=cell)
 
 
 def families_of(result: SearchResult) -> list[FunctionFamily]:

@@ -24,7 +24,7 @@ from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, Functio
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
-from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
@@ -85,15 +85,16 @@ def empirical_model(result: SearchResult) -> EmpiricalModel | None:
     data = evidence.FunctionFit.of(result, families_of(result))
     if not data.families or not data.degrees:
         return None
-    beside, described = data, list[EmpiricalFunction]()
+    beside, described = data.refined(), list[EmpiricalFunction]()
     while len(described) < _MOST and beside.total - beside.nothing > np.log(ODDS):
         found = _described(beside, result)
         if any(one.term == found.term for one in described):  # names of a job's effects differ
             found = replace(found, stated=found.stated.replace('"\nformula', f'_{len(described) + 1}"\nformula', 1))
         described.append(found)
-        beside = beside.with_function(beside.versions(1)[0])
+        beside = beside.with_function(beside.versions(1)[0]).refined()
     if not described:
         return None
+    data = replace(data, families=beside.families)
     gains = evidence.improvements(result, data, len(described))
     chosen = 0
     for i, gain in enumerate(gains[1:], 1):  # a further function is kept where it predicts better than those before it
@@ -117,7 +118,9 @@ def _described(data: evidence.FunctionFit, result: SearchResult) -> EmpiricalFun
     forms = sorted(by[term].items(), key=lambda item: -item[1])
     name, most = forms[0]
     chosen = [i for i, family in enumerate(data.families) if family.term == term]
-    own = [i for i in chosen if data.families[i].form == name]
+    most_of = {i: float(data.evidence[i][0].max()) for i in chosen if data.families[i].form == name}
+    best = data.families[max(most_of, key=lambda i: most_of[i])]
+    own = [i for i in most_of if data.families[i].formula == best.formula]
     x, y, u = _function(data, chosen)
     form, stated = None, ""
     if name not in (SMOOTH, ROUGH) and (most >= ODDS / (1 + ODDS) or not len(x)):
@@ -182,9 +185,7 @@ def _amplitude(data: evidence.FunctionFit) -> float:
 
 
 def _named(data: evidence.FunctionFit, own: Sequence[int], name: str, probability: float) -> tuple[NamedForm, str]:
-    finer = [data.families[i].divided(_likely(data.evidence[i][0])) for i in own]
-    data = replace(data, families=finer)
-    versions = _among(data, range(len(finer)))
+    versions = _among(data, own)
     weight = np.array([p for _, p in versions])
     each = [data.fitted(version)[:2] for version, _ in versions]
     sizes = np.array([mean for mean, _ in each]) * UNKNOWN_SD / MICROMETRE  # (v, r)
@@ -193,7 +194,7 @@ def _named(data: evidence.FunctionFit, own: Sequence[int], name: str, probabilit
     variance = weight @ (spread + (sizes - mean) ** 2)
     size, along = float(np.linalg.norm(mean)), mean / max(float(np.linalg.norm(mean)), 1e-300)
     parameters = {"size_um": _quantity(float(mean[0]) if len(mean) == 1 else size, float(along**2 @ variance), "µm")}
-    family = data.families[0]
+    family = data.families[own[0]]
     nodes = [(data.families[version.family].shaped, version.index) for version, _ in versions]
     shapes, apart = (
         np.array([getattr(form, of)[index] if form else [] for form, index in nodes]) for of in ("shapes", "apart")
@@ -207,12 +208,6 @@ def _named(data: evidence.FunctionFit, own: Sequence[int], name: str, probabilit
         text = re.sub(rf"\b{parameter}\b", f"{values[k]:.7g}", text)
     stated = "" if family.term.along is None else _stated(family.term, text.split(";"), np.abs(mean).tolist())
     return NamedForm(name, probability, parameters), stated
-
-
-def _likely(log: Floats) -> Ints:
-    """Functions (l,) of a family that are probable beside its best."""
-    each = log.max(axis=1)
-    return np.flatnonzero(each > each.max() + np.log(evidence.IMPROBABLE))
 
 
 def _quantity(value: float, variance: float, of: str) -> Quantity:

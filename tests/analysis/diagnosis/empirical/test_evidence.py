@@ -10,7 +10,7 @@ from scipy import linalg, special, stats
 
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit, FunctionVersion, predictions, residuals
-from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm, forms_of
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.points import Floats
 
@@ -138,3 +138,58 @@ def test_residuals_without_a_function_are_those_of_generalised_least_squares(fit
     none, one = residuals(fit, 1)
     assert none == pytest.approx(told, abs=1e-9)
     assert np.linalg.norm(one) < 0.5 * np.linalg.norm(none)
+
+
+X, COUNT = np.linspace(0.0, 900.0, 80), np.arange(5.0, 16.0, 0.35)
+
+
+def of_sines(frequency: Floats) -> FunctionFamily:
+    """Of so many periods over the range, (K,)."""
+    period = 900.0 / frequency
+    form = replace(
+        next(f for f in forms_of(X) if f.name == "sine"),
+        shapes=period[:, None],
+        apart=np.abs(np.gradient(period))[:, None],
+    )
+    values = 0.05 * form.values(X, form.shapes)
+    term, log_prior = FunctionTerm("x_mm", Verbatim("x"), "x"), -float(np.log(len(period)))
+    return FunctionFamily(term, "sine", values / 0.05, log_prior, X, values, form, lambda columns: columns / 0.05)
+
+
+def of_wave(frequency: float, family: FunctionFamily) -> FunctionFit:
+    y = 0.01 * np.sin(2 * np.pi * X * frequency / 900.0 + 0.4) + 0.003 * np.random.default_rng(3).standard_normal(80)
+    sigma = np.geomspace(1e-4, 0.1, 300)
+    return FunctionFit(y, np.ones((80, 1)), np.eye(80), [family], sigma, np.full(300, -np.log(300)), 1e-4)
+
+
+@pytest.mark.parametrize("frequency", [COUNT[15], COUNT[15] + 0.11, COUNT[15] + 0.175])
+def test_a_finer_grid_has_the_evidence_of_a_dense_one_wherever_the_period_lies(frequency: float) -> None:
+    """Half way between two nodes a grid 0.35 periods apart loses ten; the dense one has a node each 0.005 periods."""
+    fit = of_wave(frequency, of_sines(COUNT))
+    dense = of_wave(frequency, of_sines(np.arange(COUNT[0] - 0.1725, COUNT[-1] + 0.175, 0.005)))
+    finer = fit.refined()
+    assert finer.total == pytest.approx(dense.total, abs=0.3)
+    assert frequency != COUNT[15] + 0.175 or fit.total < dense.total - 5.0
+    best = finer.versions(1)[0]
+    form = finer.families[best.family].shaped
+    assert form is not None
+    assert 900.0 / float(form.shapes[best.index, 0]) == pytest.approx(frequency, abs=0.06)
+
+
+def test_finer_nodes_are_together_as_probable_beforehand_as_those_in_whose_place_they_stand() -> None:
+    coarse, nodes = of_sines(COUNT), np.array([2, 5])
+    finer, rest = coarse.finer(nodes), coarse.without(nodes)
+    assert finer is not None
+    assert finer.shaped is not None
+    prior = [len(one.shaped.shapes) * np.exp(one.log_prior) for one in (finer, rest) if one.shaped]
+    assert prior == pytest.approx([2 / len(COUNT), 1 - 2 / len(COUNT)])
+    assert finer.cell is not None
+    assert np.bincount(finer.cell).tolist() == [9, 9]
+    assert finer.shaped.shapes[[4, 13], 0] == pytest.approx(900.0 / COUNT[nodes])
+    assert finer.finer(np.array([0])) is None
+
+
+def test_a_node_made_finer_counts_as_one_function_among_those_that_are_followed() -> None:
+    """Its probability is that of all that stand in its place: none is lost because it was divided."""
+    fit = of_wave(COUNT[15] + 0.11, of_sines(COUNT)).refined()
+    assert sum(version.probability for version in fit.versions()) == pytest.approx(1.0, abs=0.01)
