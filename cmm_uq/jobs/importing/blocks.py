@@ -28,8 +28,8 @@ from cmm_uq.jobs.importing.format import (
     sources_of,
     unit_named,
 )
-from cmm_uq.jobs.importing.header import WORD, named_alike, plain_words, without_unit, words_of
-from cmm_uq.jobs.importing.lengths.places import END, START, role_among, said_in, says_figures, without_place
+from cmm_uq.jobs.importing.header import COVERAGE, WORD, named_alike, plain_words, without_unit, words_of
+from cmm_uq.jobs.importing.lengths import places
 
 _RULE = re.compile(r"[-=_*+|.\s]*")
 DATED = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}|\d:\d\d|年")
@@ -99,7 +99,7 @@ class CutSheet:
 
     def place(self, i: int) -> bool:
         """Whether a row says the place of a line."""
-        return said_in([self.line(i)], self.sign).whole
+        return places.said_in([self.line(i)], self.sign).whole
 
     def line(self, row: int) -> str:
         return " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
@@ -147,7 +147,7 @@ class CutSheet:
         if (len(numbers) not in (1, 2, 3, 6) and numbers in beside) or not self.place(i):
             return False
         texts = [self.text(i, k) for k in range(len(self.figures[i])) if k not in numbers]
-        return not said_in(texts, self.sign).whole
+        return not places.said_in(texts, self.sign).whole
 
     def _is_head(self, i: int) -> bool:
         """Whether a row with figures counts columns, as ``1 2 3 1 2 3``."""
@@ -165,8 +165,8 @@ class CutSheet:
         if all(isinstance(row[k], str) and _RULE.fullmatch(row[k]) for k in filled):  # type: ignore[arg-type]
             return "rule"
         numbers = [k for k in filled if self.figures[i][k] is not None]
-        around = [self.figures[j] for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
-        beside = [[k for k, f in enumerate(own) if f is not None] for own in around]
+        near = [j for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
+        beside = [[k for k, f in enumerate(self.figures[j]) if f is not None] for j in near]
         if not numbers or self._place_within(i, numbers, beside):
             return "text"
         counted = len(filled) == 2 and numbers == filled[1:] and (self.figures[i][filled[1]] or (0, 0))[1] >= 1
@@ -181,8 +181,12 @@ class CutSheet:
             ):
                 return "text"
         texts = {k for k in filled if k not in numbers and unit_named(self.text(i, k)) is None}
-        told = len(numbers) > 1 and all(k - 1 in texts for k in numbers) and numbers not in beside
-        return "text" if told else "figures"
+        alike = [j for j, own in zip(near, beside, strict=True) if numbers == own]
+        lined = len(texts) > 2 and hint(self.text(i, 0), lengths=True) == LINE  # as ``Axis X | Runs 3 | Targets | 6``
+        if lined:
+            alike = [j for j in alike if hint(self.text(j, 0), lengths=True) == LINE]
+        named = all(k - 1 in texts for k in numbers) and (lined or len(numbers) > 1)
+        return "text" if named and not alike else "figures"
 
     def _blocks(self) -> Iterator[Block]:
         pending: list[int] = []
@@ -254,34 +258,35 @@ class CutSheet:
         ]
         columns: dict[str, list[int]] = {}
         for i, text in heads:
-            columns.setdefault(START if _ORIGIN.search(text) else role_among(text), []).append(i)
-        by_words = {role: own for role, own in columns.items() if role and len(own) == 3}
-        if START in by_words and len(by_words) > 1:
+            columns.setdefault(places.START if _ORIGIN.search(text) else places.role_among(text), []).append(i)
+        by_words = {
+            role: own for role, own in columns.items() if role and len(own) == (1 if role in places.ANGLES else 3)
+        }
+        if {places.START, places.CENTRE} & {*by_words} and len(by_words) > 1:
             return by_words
-        last = [path[-1].strip() if path else "" for path in block.paths]
+        named = (next((one for one in path[::-1] if _AXIS_LETTER.search(one)), "") for path in block.paths)
+        last = [one or (path[-1] if path else "") for one, path in zip(named, block.paths, strict=True)]
         axes = ["".join(_AXIS_LETTER.findall(text)).upper() for text in last]
         for i, text in enumerate(axes):
-            if last[i + 1 : i + 3] == ["", ""] and text == "XYZ":
+            if not any(map(str.strip, last[i + 1 : i + 3])) and text == "XYZ":
                 axes[i : i + 3] = "XYZ"  # one head over three
         six = [(i, axes[i]) for i, _ in heads if len(axes[i]) == 1]
         if "".join(axis for _, axis in six) != "XYZXYZ":
             return by_words
-        found = {START: [i for i, _ in six[:3]], END: [i for i, _ in six[3:]]}
+        found = {places.START: [i for i, _ in six[:3]], places.END: [i for i, _ in six[3:]]}
         others = [i for i in range(self.width) if i not in dict(six) and self._as_far(block, found, i)]
-        step = self._step(block, dict(six))
+        rows = [row for row in block.rows if all(self.figure(row, i) for i, _ in six)]
+        step, fine = (min((f[1] for row in rows for i in own if (f := self.figure(row, i))), default=1.0)
+                      for own in (dict(six), others))  # fmt: skip
         # finer ones are measured balls, unless a length beside them is much finer still
-        return found if others and (step >= _MEASURED or self._step(block, others) * FINER <= step) else by_words
-
-    def _step(self, block: Block, columns: Iterable[int]) -> float:
-        """Of the finest figures of columns."""
-        return min((f[1] for row in block.rows for i in columns if (f := self.figure(row, i))), default=1.0)
+        return found if others and (step >= _MEASURED or fine * FINER <= step) else by_words
 
     def _as_far(self, block: Block, columns: Mapping[str, Sequence[int]], i: int) -> bool:
         """Whether starts and ends are as far apart as the longest of the lengths in a column that were measured there."""
         longest: dict[float, float] = {}
         apart = np.nan
         for row in block.rows:
-            ends = [(self.figure(row, k) or (np.nan,))[0] for one in (START, END) for k in columns[one]]
+            ends = [(self.figure(row, k) or (np.nan,))[0] for one in (places.START, places.END) for k in columns[one]]
             own = float(np.linalg.norm(np.subtract(ends[3:], ends[:3])))
             apart = own if np.isfinite(own) else apart  # where a line is named once
             if np.isfinite(apart):
@@ -295,23 +300,38 @@ class CutSheet:
             columns = self._columns[block.number] = self._place_columns(block)
         for i, own in enumerate(self.figures[row]):
             if own is None and (text := self.text(row, i)):
-                role = role_among(heading(block.paths[i]) if i < len(block.paths) else "")
-                texts.append(f"{role} {text}" if role in (START, END) else text)
-        for role, three in columns.items():
-            values = [f"{f[0]:.10g}" for f in (self.figure(row, i) for i in three) if f]
-            texts += [f"{role} ({'; '.join(values)})"] if len(values) == 3 else []
+                role = places.role_among(heading(block.paths[i]) if i < len(block.paths) else "")
+                texts.append(f"{role} {text}" if role in (places.START, places.END) else text)
+        first = min((i for own in columns.values() for i in own), default=0)
+        values = {role: self._held(row, own, first) for role, own in columns.items()}
+        if all(values.get(angle) for angle in places.ANGLES):
+            azimuth, elevation = (np.radians(values.pop(angle)[0]) for angle in places.ANGLES)
+            across = np.cos(elevation)
+            values[places.DIRECTION] = [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)]
+        texts += [
+            f"{role} ({'; '.join(f'{one:.10f}' for one in own)})" for role, own in values.items() if len(own) == 3
+        ]
         return tuple(texts)
+
+    def _held(self, row: int, columns: Sequence[int], first: int) -> list[float]:
+        """Figures of a row in columns, or of the row above that they hold on from, where nothing stands ahead of ``first``."""
+        rows = self.block_of[row].rows
+        for k in range(rows.index(row), -1, -1):
+            found = [f[0] for i in columns if (f := self.figure(rows[k], i))]
+            if found or any(self.text(rows[k], i) for i in range(first)):
+                return found
+        return []
 
     def placed(self, rows: Iterable[int]) -> bool:
         """Whether all rows say where their lines lie."""
-        return all(said_in(self.says(row), self.sign).whole for row in rows)
+        return all(places.said_in(self.says(row), self.sign).whole for row in rows)
 
     def _titles(self, row: int) -> dict[str, str]:
         """Titles in a row of text, by the word that each begins with; without one where it has nothing else."""
         cells = [str(cell) for cell in self.sheet.rows[row] if cell != ""]
         text = self.line(row)
         if placed := self.place(row):
-            text = without_place(text, self.sign)
+            text = places.without_place(text, self.sign)
         pairs = _PAIRS.split(text)
         parts = pairs if all(":" in pair for pair in pairs) else [text]
         parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
@@ -333,14 +353,14 @@ class CutSheet:
             texts = [self.text(row, k) for k in filled]
             odd = any(
                 len(text) > 60
-                or (len(filled) < 4 and "=" in text and not says_figures(text))
+                or (len(filled) < 4 and "=" in COVERAGE.sub("", text) and not places.says_figures(text))
                 or len(_PRINTED.findall(_BRACKETS.sub("", text))) > 1
                 for text in texts
             )
             odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3
             over = [k for k in filled if k in numbers]
             each = over == filled and len(over) + 1 >= len(numbers)  # then they stand above columns
-            placed = self.place(row) and not each and sum(map(says_figures, texts)) < _SEVERAL
+            placed = self.place(row) and not each and sum(map(places.says_figures, texts)) < _SEVERAL
             if len(head) == DEEPEST or odd or not self._ruled.issuperset(between) or placed:
                 break
             apart = not head and (len(filled) < 2 or not over) and filled != over

@@ -83,9 +83,10 @@ def columns_of(
     table = ExportTable(sheet, header, where)
     plain = [name for name in header.columns if name != NAME and name not in NUMBERS]
     numeric = [i for name in plain for i in header.columns[name]]
-    sign = sheet.decimal or decimal_sign(
-        [table.cells[i] for i in numeric], lambda i, row: table.place(numeric[i], row), keys.decimal
-    )
+    stated = [*header.units.values(), *filter(None, map(units.length_named, (sheet.unit or "", keys.unit or "")))]
+    most = LARGEST_MACHINE_MM / min((unit.metres * 1000 for unit in stated if unit.sort == LENGTH), default=1.0)
+    cells = [table.cells[i] for i in numeric]
+    sign = sheet.decimal or decimal_sign(cells, lambda i, row: table.place(numeric[i], row), keys.decimal, most)
     written = {name: table.written(name, sign) for name in plain}
     _refuse_lengths_along_axes(written, table.start)
     _refuse_places_of_lengths(written, table, sign)

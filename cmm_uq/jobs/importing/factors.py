@@ -230,6 +230,11 @@ def varying(labels: Sequence[Label], *, lengths: bool) -> list[Counted]:
             if (
                 before is None
                 or (before[2] is None and of is not None)
+                or (
+                    lengths
+                    and before[2] is of is None
+                    and before[0].values[0].isdecimal() > label.values[0].isdecimal()
+                )
                 or (label.sort == "head" and of == LINE and counting(before[0].values))
                 or (before[2] == POINT and label.sort == "column" and hint(label.words, lengths=lengths) == LINE)
             ):

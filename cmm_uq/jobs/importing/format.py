@@ -128,6 +128,12 @@ def sources_of(sources: Sources) -> list[Source]:
     return sources if isinstance(sources, list) else [sources]
 
 
+Encoding = Literal[
+    "utf-8", "utf-16", "latin-1", "cp1250", "cp1251", "cp1252", "cp1253", "cp1254", "cp850", "cp852", "cp866", "cp932",
+    "gb18030", "cp949", "big5",
+]  # fmt: skip
+
+
 class FileKeys(JobTable):
     """Of any table that is imported; each is needed only where the file leaves it open."""
 
@@ -141,9 +147,7 @@ class FileKeys(JobTable):
     decimal: Literal[".", ","] | None = key(None, "The file's decimal sign, where its numbers can be read either way.")
     delimiter: Literal[",", ";", "tab", "blank", "|"] | None = None
     """What separates the cells of a text file, where that is not found."""
-    encoding: (
-        Literal["utf-8", "utf-16", "cp1252", "latin-1", "cp932", "cp1250", "cp1251", "gb18030", "cp949"] | None
-    ) = None
+    encoding: Encoding | None = None
     """Encoding of a text file, where it is mistaken for another."""
 
     @field_validator("unit")

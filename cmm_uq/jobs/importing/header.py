@@ -30,7 +30,7 @@ NAME = "name"  # of the point or feature, by which it may be numbered; no column
 def plain_words(text: str) -> list[str]:
     plain = text.casefold()
     if not plain.isascii():
-        plain = unicodedata.normalize("NFKD", plain.translate(_ORDINAL))
+        plain = unicodedata.normalize("NFKD", plain.translate(_SAME))
         plain = unicodedata.normalize("NFC", "".join(c for c in plain if not unicodedata.combining(c)))
     return _WORDS.findall(plain)
 
@@ -70,7 +70,11 @@ def words_of(table: str) -> Mapping[str, frozenset[str]]:
 
 # Japanese and Korean beside a letter is a word of its own
 _WORDS = re.compile(r"[^\W\d_\u3040-\u9fff\uac00-\ud7a3]+|[\u3040-\u9fff\uac00-\ud7a3]+|\d+")
-_ORDINAL = str.maketrans("łøđı", "lodi", "ªº°")  # letters that are none with an accent; signs after a number
+# letters that are none with an accent, characters in their simplified form; signs after a number
+_SAME = str.maketrans(
+    "łøđı標稱準測誤實際長線軸點對対參極負數離徑圓値單単復環規階週塊處間終檢",
+    "lodi标称准测误实际长线轴点对对参极负数离径圆值单单复环规阶周块处间终检", "ªº°",
+)  # fmt: skip
 _COLUMNS = {phrase: column for column, phrases in words_of("columns").items() for phrase in phrases}
 _AXIS = words_of("axis")  # words beside the letter of an axis, those that leave it a coordinate among them
 _NOMINAL, _SMALL, _POINT = _AXIS["nominal"], _AXIS["small"], words_of("columns")["point"]
@@ -322,11 +326,21 @@ def text_of(cell: Cell) -> str:
     return cell if isinstance(cell, str) else f"{cell:g}"
 
 
+@cache
+def _words_of_sums() -> tuple[frozenset[str], frozenset[str]]:
+    """Words for figures of others, as ``mean``, and those together with what they may be of."""
+    of = words_of("lengths")
+    sums = frozenset(word for word in of["summary"] if len(word) > len("sd"))
+    return sums, sums | of["length"] | of["deviation"]
+
+
 def is_summary(row: Sequence[Cell]) -> bool:
     """Whether one of the first two cells is a word for a figure of other rows, or the first has a unit: ``Form (µm)``."""
     labels = [cell for cell in row if cell != ""][:2]
-    words = (" ".join(plain_words(cell)) for cell in labels if isinstance(cell, str) and not cell[-1:].isdigit())
-    if any(own in words_of("rows")["summary"] for own in words):
+    words = [plain_words(cell) for cell in labels if isinstance(cell, str) and not cell[-1:].isdigit()]
+    sums, others = _words_of_sums()
+    known = words_of("rows")["summary"]
+    if any(" ".join(own) in known or (not sums.isdisjoint(own) and others.issuperset(own)) for own in words):
         return True
     label = text_of(labels[0]) if labels else ""
     return label.endswith((")", "]")) and not re.search(r"\d", label) and without_unit(label)[1] is not None

@@ -46,7 +46,7 @@ from cmm_uq.jobs.importing.format import (
     sheets_of,
 )
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
-from cmm_uq.jobs.importing.lengths.places import place_of_axis
+from cmm_uq.jobs.importing.lengths.placing import place_of_axis
 from cmm_uq.jobs.importing.reports import TextReport
 from cmm_uq.jobs.importing.roles import SheetReading
 

@@ -10,6 +10,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.header import printed_words
+from cmm_uq.jobs.importing.lengths.places import says_figures
 from cmm_uq.jobs.importing.reports import AXES, WITH_DIRECTION, ReportedPlace, TextReport, facts_of
 
 _WORDS = {name: "|".join(map(re.escape, words)) for name, words in printed_words("report").items()}
@@ -68,6 +69,10 @@ class PcDmis(TextReport):
             raise CmmUqError(problem, where=f"{where} line {units[1].line}", fix="Report all dimensions in one unit")
         facts = facts_of(encoding, "dimensions_not_used", say("Dimensions that are no place"), len(found) - len(rows))
         unit = places[0].unit if places else found[0].unit or None
+        if not places:  # comments may say where lines lie
+            others = (one for one in enumerate(lines, 1) if not (_DIMENSION.match(one[1]) or _FIGURES.match(one[1])))
+            rows += [("", [text.strip(), "", ""], line) for line, text in others if says_figures(text)]
+            rows.sort(key=lambda row: row[2])
         sheets = sheets_of(rows, headings, unit=unit, facts=facts)
         return sheets if places else [replace(one, rows=[headings, *one.rows[1:]]) for one in sheets]
 

@@ -59,7 +59,7 @@ from cmm_uq.jobs.machines import coordinates, required_columns
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
 _UNIT_LINE = re.compile(
-    r"(?:\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+|(?:単位|单位|단위)\s*[:：=;]*"
+    r"(?:\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+|(?:単位|单位|單位|단위)\s*[:：=;]*"
     r"|\b(?:dimensions|lengths|values|angaben|ma(?:ß|ss)e|werte|cotes|valeurs|misure|valori|medidas)\s+(?:in|en)\b)\s*([^\s;,]+)",
     re.IGNORECASE,
 )

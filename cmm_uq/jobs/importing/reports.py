@@ -339,7 +339,21 @@ def _probed(tag: str, terms: dict[str, str], line: int, where: str) -> Row:
 _PAIR = re.compile(
     r"(?<!\w)([^\W\d]\w*)\s{0,9}=\s{0,9}([^\s=|]{1,40})|(?<![\w.])([XYZ])\s{0,9}:?\s{0,9}([-+]?\d+[.,]\d+)(?![\w.])"
 )
-_LEAST = 6  # lines of one form
+# as ``block 20  true 20,00003  errors +0,5 +0,2``
+_WORDED = re.compile(r"([^\W\d][\w.]*)[:=]?\s+((?:[-+]?\d[\d.,]*(?:\s+|$))+)")
+_LEAST, _PART = 6, 3  # lines of one form, at least, and of how many of all one must have it
+
+
+def _named_figures(line: str) -> tuple[str, list[tuple[str, str]]]:
+    """What stands ahead of the figures of a line, and each with its name; none of another line."""
+    found = [*_PAIR.finditer(line)] if len(line) < LINE.most else []
+    if len(found) > 1:
+        return line[: found[0].start()].strip(" |;,\t"), [(m[1] or m[3], m[2] or m[4]) for m in found]
+    worded = [(m[1], m[2].split(), m[0]) for m in _WORDED.finditer(line)] if len(line) < LINE.most else []
+    if len(worded) < 2 or "".join(whole for *_, whole in worded) != line:
+        return "", []
+    each = ((word, own, k) for word, own, _ in worded for k in range(len(own)))
+    return "", [(f"{word} {k + 1}" if len(own) > 1 else word, own[k]) for word, own, k in each]
 
 
 def in_pairs(text: str) -> list[tuple[int, list[str]]] | None:
@@ -348,16 +362,15 @@ def in_pairs(text: str) -> list[tuple[int, list[str]]] | None:
     The names stand ahead of the first; what stands ahead of all pairs of a line is a cell too.
     """
     lines = [line.strip() for line in text.splitlines()]
-    found = [[*_PAIR.finditer(line)] if len(line) < LINE.most else [] for line in lines]
-    pairs = [[(m[1] or m[3], m[2] or m[4]) for m in own] if len(own) > 1 else [] for own in found]
-    forms = Counter(tuple(name for name, _ in own) for own in pairs if own)
+    found = [*map(_named_figures, lines)]
+    forms = Counter(tuple(name for name, _ in own) for _, own in found if own)
     form, count = max(forms.items(), key=lambda one: one[1], default=((), 0))
-    if count < _LEAST or 2 * count < sum(map(bool, lines)):
+    if count < _LEAST or _PART * count < sum(map(bool, lines)):
         return None
     rows: list[tuple[int, list[str]]] = []
-    for n, (line, own, at) in enumerate(zip(lines, pairs, found, strict=True), 1):
+    for n, (line, (ahead, own)) in enumerate(zip(lines, found, strict=True), 1):
         same = tuple(name for name, _ in own) == form
         if same and not any(len(cells) > 1 for _, cells in rows):
             rows.append((n, ["", *form]))
-        rows.append((n, [line[: at[0].start()].strip(" |;,\t"), *(value for _, value in own)] if same else [line]))
+        rows.append((n, [ahead, *(value for _, value in own)] if same else [line]))
     return rows

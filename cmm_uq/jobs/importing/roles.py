@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -30,6 +31,7 @@ _ROLES = {name: role for role, names in _OF_NAMES.items() for name in names.spli
 _CLAIMS: Mapping[Role, tuple[Role, ...]] = {"reference": ("reference", "nominal", "target")}
 _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
 _FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
+_INFLECTED = 7  # letters of a word of which the last may be another
 _COARSE = 0.05  # mm: figures printed no finer than this are nominal, and exact
 Labels = dict[tuple[str, str], str]  # what stands beside an observation, by sort and words
 
@@ -232,13 +234,20 @@ def said(path: Sequence[str]) -> Role | None:
     words = [word for text in texts for word in plain_words(text)]
     short = [own[-1] for text in texts for part in _ABBREVIATED.findall(text) if (own := plain_words(part))]
     of = words_of("lengths")
-    exact = (role for role in _IN_TURN if not of[role].isdisjoint(words))
+    inflected = {word[:-1] for word in words if len(word) >= _INFLECTED}
+    exact = (role for role in _IN_TURN if not of[role].isdisjoint(words) or not _stems(role).isdisjoint(inflected))
     abbreviated = (role for role in _IN_TURN if any(one.startswith(part) for part in short for one in of[role]))
     if (role := next(exact, None) or next(abbreviated, None)) is not None:
         return role
     asian = [word for word in words if unspaced(word)]
     fits = [(len(one), role) for role in _IN_TURN for one in of[role] if any(one in word for word in asian)]
     return max(fits)[1] if fits and max(fits)[0] > 1 else None
+
+
+@cache
+def _stems(role: Role) -> frozenset[str]:
+    """Words of a role without the last letter, which is another in other genders and numbers."""
+    return frozenset(word[:-1] for word in words_of("lengths")[role] if len(word) >= _INFLECTED)
 
 
 def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> list[FigureColumn]:

@@ -15,24 +15,24 @@ from itertools import permutations
 
 import numpy as np
 
-from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import DASH, Verbatim, commas, names, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading
+from cmm_uq.jobs.importing.cells import left_out
 from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
-from cmm_uq.jobs.importing.cells.left_out import below_deviations, is_void, of_feature, rows_left_out
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
 from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import places
-from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary
-from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of
+from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary, shown
+from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of, take_certified
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
-from cmm_uq.jobs.importing.lengths.places import place_of_axis, says_figures, stated_places
+from cmm_uq.jobs.importing.lengths.places import says_figures
+from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, stated_places
 from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths, axis_in
@@ -41,7 +41,6 @@ from cmm_uq.jobs.importing.roles import SheetReading, each, joined, said_by
 
 _COMPARED = 5000  # points of sheets
 ROWS_MOST = 20_000  # of a sheet that is understood this way
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")
 Found = tuple[SheetReading, CutSheet]
 
 
@@ -64,7 +63,7 @@ def understand(
             if sheets[0].listed:
                 break
     if best is not None:
-        _refuse_either_sign(best.grid)
+        left_out.refuse_either_sign(best.reading, best.grid)
     elif problem is not None:
         raise problem
     return best
@@ -95,20 +94,21 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     counted = counted or (not sheets[0].listed and _elsewhere(chosen))
     if not chosen or (chosen[0][0].kind == "points" and not counted):
         return None
-    _refuse_unmatched([grid for _, grid in chosen], keys, where)
+    left_out.refuse_unmatched([grid for _, grid in chosen], keys, where)
     elsewhere = _said_elsewhere(upright, chosen)
     _refuse_same_lines(chosen, where)
-    left_out: list[str] = []
+    apart = [(grid.sheet, reading) for reading, grid in found if all(grid is not other for _, other in chosen)]
+    without = [shown(sheet, reading.rows[0], "another table") for sheet, reading in apart]
     _take_results(found, chosen)
     for grid in {id(own): own for _, own in chosen}.values():
-        if (told := rows_left_out([reading for reading, own in chosen if own is grid], grid)) is None:
+        if (told := left_out.rows_left_out([reading for reading, own in chosen if own is grid], grid)) is None:
             return None
-        left_out += told
+        without += told
     _label(chosen)
     grid = chosen[0][1]
-    return Understanding(
-        joined([reading for reading, _ in chosen]), sheets, left_out, grid, elsewhere, across=grid in across
-    )
+    whole = joined([reading for reading, _ in chosen])
+    take_certified(whole, [*map(CutSheet, upright)])
+    return Understanding(whole, sheets, without, grid, elsewhere, across=grid in across)
 
 
 def _take_results(found: Sequence[Found], chosen: Sequence[Found]) -> None:
@@ -165,16 +165,15 @@ def _chosen(found: Sequence[Found]) -> list[Found]:
         if one[1] is other[1] and sums_of(one[0].source, other[0].source):
             other[0].summaries, one[0].figures = [*other[0].summaries, *one[0].rows], []
     chosen = [one for one in chosen if one[0].figures]
+    # lengths of another sheet that have no reference, and are near none, are no lengths of the artefact
+    references = [own[0] for one, _ in chosen if one.taken.get("reference_mm") for own in one.figures]
+    lengths = references if kind == "lengths" else []
+    chosen = [one for one in chosen if one[0].taken.get("reference_mm") or _near(one[0], lengths)]
     return [one for one in chosen if len(one[0].figures) * 8 > max(len(other[0].figures) for other in chosen)]
 
 
-def _refuse_unmatched(grids: Sequence[CutSheet], keys: Mapping[str, Sources], where: str) -> None:
-    """A column that the job names must be there."""
-    matched = {one for grid in grids for one in grid.matched}
-    for source in (str(one) for sources in keys.values() for one in formats.sources_of(sources)):
-        if source not in matched:
-            headings = [heading(path) for path in grids[0].blocks[-1].paths]
-            raise NotReadError(f"no column is {source!r}", where=where, fix=suggestion(source, headings))
+def _near(reading: SheetReading, references: Sequence[float]) -> bool:
+    return not references or bool(np.isclose(reading.figures[0][1], references, rtol=2e-3).any())
 
 
 def _refuse_same_lines(chosen: Sequence[Found], where: str) -> None:
@@ -198,7 +197,7 @@ def _refuse_same_lines(chosen: Sequence[Found], where: str) -> None:
         raise NotReadError(what, where=where, fix=f'Say which: sheet = "{first}"')
 
 
-def _said_elsewhere(sheets: Sequence[Sheet], chosen: Sequence[Found]) -> list[tuple[str, str]]:
+def _said_elsewhere(sheets: Sequence[Sheet], chosen: Sequence[Found]) -> Elsewhere:
     """Rows that are not read and may say where lines lie, each with the text in its first cell; none of places themselves."""
     if chosen[0][0].kind == "points":
         return []
@@ -208,8 +207,8 @@ def _said_elsewhere(sheets: Sequence[Sheet], chosen: Sequence[Found]) -> list[tu
         for row in range(min(len(grid.sheet.rows), LINES_BEFORE)):
             if (grid.sheet.name, grid.sheet.lines[row]) not in taken:
                 texts = grid.says(row) if row in grid.block_of else [grid.line(row)]
-                found.append((grid.text(row, 0), "\n".join(texts)))
-    return [(name, text) for name, text in found if says_figures(text)]
+                found.append((grid.text(row, 0), "\n".join(texts), grid.sheet.name))
+    return [one for one in found if says_figures(one[1])]
 
 
 def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
@@ -217,21 +216,24 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
     problem: NotReadError | None = None
     for blocks, rows in each(grid):
         usable = [
-            row for row in rows if not is_summary(sheet.rows[row]) and not is_void(sheet.rows[row], "void", "feature")
+            row
+            for row in rows
+            if not is_summary(sheet.rows[row]) and not left_out.is_void(sheet.rows[row], "void", "feature")
         ]
-        deviations = below_deviations(grid, usable)  # beside what they are of
+        deviations = left_out.below_deviations(grid, usable)  # beside what they are of
         own = _layout(grid, [row for row in usable if row not in deviations]) if usable else []
         readings: list[SheetReading] = []
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
-        for read in (lengths + places if grid.placed(own) else places + lengths) if own else ():
+        placed = grid.placed(own)
+        for read in (lengths + places if placed else places + lengths) if own else ():
             try:
-                of_places = [row for row in own if not of_feature(grid, row)] or own
+                of_places = [row for row in own if not left_out.of_feature(grid, row)] or own
                 reading = read(grid, blocks, own if read in lengths else of_places)
             except EitherError as error:
                 problem, reading = problem or error, None
             if reading is not None and (
-                passes_over_axes(reading, blocks[0].paths) or (across and few_of(reading, grid, own))
+                (not placed and passes_over_axes(reading, blocks[0].paths)) or (across and few_of(reading, grid, own))
             ):
                 continue
             # of a turned sheet words must say which lengths, or targets, those that were measured are of
@@ -277,7 +279,7 @@ class Understanding:
     sheets: Sequence[Sheet]
     left_out: list[str]
     grid: CutSheet
-    elsewhere: Sequence[tuple[str, str]] = ()  # rows that may say where lines lie, each with the text in its first cell
+    elsewhere: Elsewhere = ()  # that may say where lines lie
     across: bool = False  # whether rows and columns were exchanged
 
     def outdoes(self, other: Understanding) -> bool:
@@ -301,6 +303,10 @@ class Understanding:
         stated = [(unit, how) for unit, how in every if unit is not None]
         if not stated and (unit := unit_elsewhere(self.sheets, small=False)) is not None:
             stated = [(unit, say("the only one that the file mentions"))]
+        small = self.reading.small or unit_elsewhere(self.sheets, small=True)
+        if not stated and small is not None and self.reading.kind != "points":
+            system = formats.UNITS["inch" if small.name == "microinch" else "mm"]
+            stated = [(system, say("as its deviations are in {unit}", unit=Verbatim(small.name)))]
         figures, points = np.array(self.reading.figures).T, self.reading.kind == "points"
         named = zip(COORDINATES if points else ("reference_mm", "length_mm"), figures, strict=True)
         written = {name: [(own, None, 0)] for name, own in named if np.isfinite(own).all()}
@@ -364,7 +370,7 @@ class Understanding:
             lines = {line for run in runs if run.axis == axis for *_, line in run.targets}
             own = zip(self.reading.lines, self.reading.labels, strict=True)
             texts = [text for line, labels in own if line in lines for text in labels["place", ""].split("\n")]
-            texts += [line for _, text in self.elsewhere if len(axes) == 1 for line in text.split("\n")]
+            texts += [line for _, text, _ in self.elsewhere if len(axes) == 1 for line in text.split("\n")]
             place = place_of_axis(axis, dict.fromkeys(texts), unit.up / unit.down, self.grid.sign)
             found |= {axis: place} if place else {}
         return found
@@ -386,14 +392,3 @@ class Understanding:
         used = [label.words.strip() for label in labels if len({*label.values}) > 1 and label.sort != "block"]
         columns = {**numbers, **dict(zip(COORDINATES, xyz.T, strict=True)), **further}
         return columns, (*self.facts(of_unit, used), *facts)
-
-
-def _refuse_either_sign(grid: CutSheet) -> None:
-    """Figures that may be thousands or thousandths, where none of the sheet tells."""
-    figured = [(row, i) for row, own in enumerate(grid.figures) for i, f in enumerate(own) if f]
-    texts = [(place, text) for place in figured if "," in (text := grid.text(*place))]
-    if grid.sheet.decimal is None and texts and all(_THOUSANDS.fullmatch(text) for _, text in texts):
-        place, first = texts[0]
-        either = f"{first.replace(',', '')} or {first.replace(',', '.')}"
-        raise CmmUqError(f"{first!r} can be {either}, and no number of the sheet tells", where=grid.at(*place),
-                         fix='Say decimal = "," or decimal = "."')  # fmt: skip

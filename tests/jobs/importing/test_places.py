@@ -10,7 +10,8 @@ from hypothesis import given, settings, strategies as st
 
 from cmm_uq.app.commands.jobs.exchange import lines_asked
 from cmm_uq.jobs.importing.format import ImportKeys
-from cmm_uq.jobs.importing.lengths.places import place_of_axis, place_of_line, said_in
+from cmm_uq.jobs.importing.lengths.places import place_of_line, said_in
+from cmm_uq.jobs.importing.lengths.placing import place_of_axis
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, imported
 
 WHOLE = {

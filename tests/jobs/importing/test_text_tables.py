@@ -326,16 +326,35 @@ def test_japanese_names_of_a_character_and_a_number_are_shift_jis() -> None:
     assert decoded(text.encode("cp932"), "export.txt") == (text, "Shift JIS")
 
 
-WESTERN = [
-    "Größe", "Länge", "Nennmaß", "Prüfkörper", "mesuré", "répétition", "Línea", "Répétabilité", "à", "Åsa", "Größen–Liste",
-    "100–200", "µm", "±0,5", "„Zitat“", "«écart»", "a–b", "‘x’", "…", "naïve", "Ø12", "20", "°C",
-]  # fmt: skip
+SIGNS = ["µm", "±0,5", "100–200", "…", "Ø12", "20", "°C", "mm²"]
+WORDS = {
+    ("cp1252", "Windows-1252"): [
+        ["Größe", "Länge", "Nennmaß", "Prüfkörper", "Größen–Liste", "„Zitat“", "ÜBER"],
+        ["mesuré", "répétition", "Répétabilité", "à", "naïve", "«écart»", "ÉTALON"], ["Línea", "medición", "Nº", "señal"],
+        ["Åsa", "mätning", "LÄGE"],
+    ],
+    ("cp1250", "Windows-1250"): [["měření", "délka", "příčka"], ["długość", "błąd", "położenie"]],
+    ("cp1254", "Windows-1254"): [["ölçüm", "değeri", "sıcaklığı", "İleri"]],
+    ("cp1251", "Windows-1251"): [["Положение", "длина", "ПОГРЕШНОСТЬ"]],
+    ("cp1253", "Windows-1253"): [["Μέτρηση", "μήκος", "θέση"]],
+    ("cp850", "code page 850"): [["Länge", "Prüfkörper", "LÄNGE"]],
+    ("cp932", "Shift JIS"): [["測定線", "校正長さ", "繰返し"]],
+    ("gb18030", "GB 18030"): [["测量值", "标称", "误差"]],
+    ("big5", "Big5"): [["量測線", "標準值", "誤差"]],
+    ("cp949", "Windows-949"): [["측정값", "길이", "위치"]],
+}  # fmt: skip
 
 
-@given(st.lists(st.sampled_from(WESTERN), min_size=1), st.sampled_from([" ", ";", "\n"]))
-def test_western_words_in_windows_1252_are_not_taken_for_japanese(words: list[str], between: str) -> None:
-    text = between.join(words)
-    assert decoded(text.encode("cp1252"), "export.csv")[0] == text
+@pytest.mark.parametrize("encoding", WORDS)
+@given(st.data())
+def test_an_encoding_is_known_by_words_of_one_language(encoding: tuple[str, str], data: st.DataObject) -> None:
+    own = data.draw(st.sampled_from(WORDS[encoding]))
+    signs = [one for one in SIGNS if one.encode(encoding[0], errors="replace").decode(encoding[0]) == one]
+    words = data.draw(
+        st.lists(st.sampled_from(signs if encoding[0] not in ("cp949", "gb18030", "cp932", "big5") else ["20"]))
+    )
+    text = data.draw(st.sampled_from([" ", ";", "\n"])).join([*own, *words])
+    assert decoded(text.encode(encoding[0]), "export.csv") == (text, encoding[1])
 
 
 IN_ROWS = {

@@ -59,7 +59,6 @@ NO_AXIS = "V30"  # runs whose file leaves open which axis was measured
 ASKED = {"10": "unit", "15": "unit", "C06": "unit", "C13": "unit", "C26": "unit"}
 """By number: what is asked beside where lines lie, of files that name no unit."""
 REFUSED = {
-    "S07": "is no measured length",
     "S29": "goes round a circle",
     "T21": "no line names",
     "T22": "no line names",
@@ -79,6 +78,7 @@ REFUSED = {
 """Of exports that are not read, what is said."""
 PLACED = {
     "B30": [100, 600, 250],
+    "S13": [20, 200, -100],
     "T01": [90, 450, -300],
     "T05": [100, 500, -400],
     "T07": [100, 400, -350],

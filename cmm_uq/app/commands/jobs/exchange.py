@@ -21,7 +21,7 @@ from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.importing.answers import as_file, folder, matching, path_of
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
-from cmm_uq.jobs.importing.lengths.places import proposed as proposed
+from cmm_uq.jobs.importing.lengths.placing import proposed as proposed
 from cmm_uq.jobs.importing.lines import UnplacedRunsError, axis_place
 from cmm_uq.jobs.importing.recording import (
     ImportedTable,

@@ -10,6 +10,8 @@ import codecs
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import lru_cache
+from itertools import pairwise
 from xml.etree.ElementTree import Element, ParseError
 
 import numpy as np
@@ -27,13 +29,25 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16", "UTF-16"),
 )
 _TITLES = {"utf-8": "UTF-8", "utf-16": "UTF-16", "latin-1": "ISO 8859-1", "cp932": "Shift JIS", "gb18030": "GB 18030"}
-_TITLES |= {f"cp{number}": f"Windows-{number}" for number in (1250, 1251, 1252, 949)}
-# two characters of Shift JIS after each other, as words of Japanese are; letters with accents in Windows-1252 are single
-_JAPANESE = re.compile(rb"(?:[\x81-\x9f][\x40-\x7e\x80-\xfc]){2}")
-_ACCENTED = re.compile(rb"(?<![\x81-\x9f])[\xc0-\xff](?![\x80-\xff])")
-# letters within words that are none of one western language, but of Czech or Polish in Windows-1250
-_EASTERN = (re.compile("(?<=[a-z])(?:ø|(?=.*ø)[ìè])|ø(?=[a-z])"), re.compile("(?<=[^\\W\\d_])[³¹¿œ](?=[^\\W\\d_])"))
-_PAIRED = re.compile(rb"[\xa1-\xfe]{2}")  # of Chinese (GB 2312) and Korean (KS X 1001), which come in words
+_TITLES |= {f"cp{number}": f"Windows-{number}" for number in (1250, 1251, 1252, 1253, 1254, 949)}
+_TITLES |= {f"cp{number}": f"code page {number}" for number in (850, 852, 866)} | {"big5": "Big5"}
+_WESTERN = "äöüß àâæçéèêëîïôùûüÿœ àèéìíîòóùú áéíóúñü ãõáâàçéêíóôúü åäöéü æøåéöä ëïéèóáüöç áéíóúýþæöð"
+_EASTERN = "áčďéěíňóřšťúůýžôľĺŕä ąćęłńóśźż áéíóöőúüű ăâîşţșț čćđšž"
+_CYRILLIC = "абвгдежзийклмнопрстуфхцчшщъыьэюяё№ґєії"
+# letters beside a to z of one language each
+_ALPHABETS = {
+    "cp1252": _WESTERN, "cp1250": _EASTERN, "cp1254": "çğıiöşüâîû", "cp1251": _CYRILLIC,
+    "cp1253": "αβγδεζηθικλμνξοπρστυφχψωςάέήίόύώϊϋΐΰ", "cp850": _WESTERN, "cp852": _EASTERN, "cp866": _CYRILLIC,
+}  # fmt: skip
+_LAST_LATIN = "\u024f"
+_SIGNS = {*"µμ°±²³«»–—„“”‚‘’…·×÷§©®€ΔΩ∅≤≥¼½¾¹ªº†•™\u00a0\u202f\ufeff"}
+_DIAMETER = re.compile(r"(?<![^\W\d_])Ø(?![^\W\d_])")
+_WITHIN = re.compile(r"(?<=[^\W\d_])[³²¹¿¾¼½ªº](?=[^\W\d_])")  # a word, in which signs are letters of another encoding
+# first and last bytes, ahead of the frequent ideographs or syllables of two, by which those standards begin; least second byte
+_LEADS = {
+    "cp932": (0x81, 0x98, 0x40), "cp949": (0xA1, 0xC8, 0xA1), "gb18030": (0xA1, 0xD7, 0xA1), "big5": (0xA1, 0xC6, 0x40)
+}  # fmt: skip
+_SAMPLE = 5000  # characters by which an encoding is known
 _FIX = "Export it again, or name encoding"
 _REPORT_LINE = 2000  # characters of a line of a report, which has 80 to 200
 
@@ -41,8 +55,8 @@ _REPORT_LINE = 2000  # characters of a line of a report, which has 80 to 200
 def decoded(content: bytes, where: str, asked: str | None = None) -> tuple[str, str]:
     """Text of a file, and what its encoding is called.
 
-    A byte-order mark decides; without one, UTF-16 shows by a zero in every other byte, UTF-8 by being valid, Shift JIS by
-    being valid with words of Japanese; what remains is Windows-1252, which has every character of ISO 8859-1 in its place.
+    A byte-order mark decides; without one, UTF-16 shows by a zero in every other byte, UTF-8 by being valid; of the others
+    that is taken in which most characters are letters of one language, or frequent ones of two bytes, Windows-1252 before all.
     """
     mark = next((found for found in _MARKS if content.startswith(found[0])), None)
     if mark is not None and (asked is None or mark[1].startswith(asked)):
@@ -67,18 +81,38 @@ def _without_mark(content: bytes) -> str:
         return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
     if content.isascii():
         return "utf-8"
-    japanese = len(_JAPANESE.findall(content)) > len(_ACCENTED.findall(_JAPANESE.sub(b"", content)))
-    paired = len(_PAIRED.findall(content)) > 2 * len(_PAIRED.sub(b"", content).translate(None, bytes(range(128)))) + 3
-    for codec in ("utf-8", *(["cp932"] if japanese else []), *(["cp949", "gb18030"] if paired else [])):
-        with suppress(UnicodeDecodeError):
-            text = content.decode(codec)
-            letters = [c for c in text if c >= "\u3400"]
-            if codec != "cp949" or sum("\uac00" <= c <= "\ud7a3" for c in letters) > 0.9 * len(letters):
-                return codec
-    western = content.decode("cp1252", errors="replace")
-    if any(len({*found.findall(western)} - {""}) > 1 for found in _EASTERN):
-        return "cp1250"
-    return "cp1252" if not any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else "latin-1"
+    with suppress(UnicodeDecodeError):
+        content.decode("utf-8")
+        return "utf-8"
+    lines = b"\n".join(line for line in content.splitlines() if not line.isascii())[:_SAMPLE]
+    known = _known(lines)
+    return "latin-1" if known == "cp1252" and any(byte in content for byte in b"\x81\x8d\x8f\x90\x9d") else known
+
+
+@lru_cache(maxsize=16)
+def _known(lines: bytes) -> str:
+    return max((*_ALPHABETS, *_LEADS), key=lambda codec: _explained(lines, codec))  # of those alike the first
+
+
+def _explained(content: bytes, codec: str) -> float:
+    """Which part of the characters that are not ASCII are signs, or letters of one language, in words of one case."""
+    text = _WITHIN.sub("\ufffd", _DIAMETER.sub("", content.decode(codec, errors="replace")))
+    others = [c for c in text if c > "\x7f" and c not in _SIGNS]
+    if codec in _LEADS:
+        first, last, least = _LEADS[codec]
+        cells = (c.encode(codec, errors="replace") for c in others)
+        known = sum(len(own) == 2 and first <= own[0] <= last and own[1] >= least for own in cells)
+    else:
+        known = max(sum(c.lower()[0] in own for c in others) for own in map(set, _ALPHABETS[codec].split()))
+        known -= sum(_ill_joined(a, b) for a, b in pairwise(text))
+    return known / len(others) if others else 1.0
+
+
+def _ill_joined(a: str, b: str) -> bool:
+    """Whether two characters stand beside each other in no word: a small letter before a capital one, two scripts."""
+    if max(a, b) < "\x80" or not (a.isalpha() and b.isalpha()) or a in "µªº":
+        return False
+    return (a.islower() and b.isupper()) or (min(a, b) < "\x80" and max(a, b) > _LAST_LATIN)
 
 
 def report_lines(content: bytes, where: str, asked: str | None = None) -> tuple[list[str], str]:
@@ -154,8 +188,8 @@ _GROUPED = {
 At = Callable[[int, int], str]  # place of a cell, by indices of column and row
 
 
-def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -> str:
-    """The decimal sign of the numbers of a table."""
+def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None, most: float = np.inf) -> str:
+    """The decimal sign of the numbers of a table, of which none is larger than ``most``."""
     if asked is not None:
         return asked
     texts = ["\n".join([cell if isinstance(cell, str) else "" for cell in column]) for column in columns]
@@ -173,6 +207,9 @@ def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -
         return "," if comma else "."
     i = next(i for i, text in enumerate(texts) if "," in text)
     row, value = next((row, str(cell)) for row, cell in enumerate(columns[i]) if isinstance(cell, str) and "," in cell)
+    thousands = (text.replace(",", "").lstrip("+-−") for own in texts for text in own.split("\n") if "," in text)
+    if any(text.isdecimal() and float(text) > most for text in thousands):
+        return ","
     problem = f"{value!r} can be {value.replace(',', '')} or {value.replace(',', '.')}, and no number of the file tells"
     raise CmmUqError(problem, where=at(i, row), fix='Say decimal = "," or decimal = "."')
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
+from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.jobs.importing import header
 from cmm_uq.jobs.importing.blocks import CutSheet, heading
+from cmm_uq.jobs.importing.columns import LARGEST_MACHINE_MM
 from cmm_uq.jobs.importing.factors import LINE, RUN, hint
-from cmm_uq.jobs.importing.format import Cell
+from cmm_uq.jobs.importing.format import UNITS, Cell, NotReadError, Sources, sources_of
 from cmm_uq.jobs.importing.header import plain_words, words_of
 from cmm_uq.jobs.importing.roles import SheetReading, said
 
@@ -104,3 +106,31 @@ def _explained(
         if not any(abs(value - one) <= 1.05 * step for one in sums):
             return False
     return True
+
+
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")
+
+
+def refuse_either_sign(reading: SheetReading, grid: CutSheet) -> None:
+    """Figures that may be thousands or thousandths, where none of the sheet tells, nor their size or that of a reference."""
+    figured = [(row, i) for row, own in enumerate(grid.figures) for i, f in enumerate(own) if f]
+    texts = [(place, text) for place in figured if "," in (text := grid.text(*place))]
+    if grid.sheet.decimal is not None or not all(_THOUSANDS.fullmatch(text) for _, text in texts):
+        return
+    largest = 1e6 * np.nanmax(np.abs(reading.figures)) * (reading.unit or UNITS["mm"]).metres
+    read = {c.i for own in reading.taken.values() for c in own}
+    commas = {i for (_, i), _ in texts if i in read}
+    if commas and largest <= LARGEST_MACHINE_MM and (commas == read or reading.kind != "lengths" or reading.deviations):
+        place, first = texts[0]
+        either = f"{first.replace(',', '')} or {first.replace(',', '.')}"
+        raise CmmUqError(f"{first!r} can be {either}, and no number of the sheet tells", where=grid.at(*place),
+                         fix='Say decimal = "," or decimal = "."')  # fmt: skip
+
+
+def refuse_unmatched(grids: Sequence[CutSheet], keys: Mapping[str, Sources], where: str) -> None:
+    """A column that the job names must be there."""
+    matched = {one for grid in grids for one in grid.matched}
+    for source in (str(one) for sources in keys.values() for one in sources_of(sources)):
+        if source not in matched:
+            headings = [heading(path) for path in grids[0].blocks[-1].paths]
+            raise NotReadError(f"no column is {source!r}", where=where, fix=suggestion(source, headings))

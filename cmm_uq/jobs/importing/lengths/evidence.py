@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import permutations
+from itertools import pairwise, permutations
 
 import numpy as np
 
 from cmm_uq.jobs.importing.blocks import CutSheet
 from cmm_uq.jobs.importing.factors import numberless, way_of
-from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, each, like, said
 
 _PART = 4  # of the figures of a turned sheet, the least that is read
 _MANY = 12  # rows in which no run is the largest, or the mean, of others by chance
@@ -111,6 +111,42 @@ def sets_of(columns: Sequence[FigureColumn], beside: FigureColumn) -> Iterator[S
     yield from ([c for c in columns if way_of(c.heading) == sense] for sense in (1, -1))
     yield from families(columns)
     yield [c for c in columns if c.i < beside.i]
+
+
+def take_certified(reading: SheetReading, grids: Sequence[CutSheet]) -> None:
+    """Calibrated lengths of another table in place of nominal ones, of which no deviation is."""
+    base = next(iter(reading.taken.get("reference_mm", ())), None)
+    if reading.kind != "lengths" or base is None or base.role == "reference" or not base.round or reading.checked:
+        return
+    known = _certified(grids)
+    if {own[0] for own in reading.figures} <= {*known}:
+        reading.figures = [(known[own[0]][0], *own[1:]) for own in reading.figures]
+        head = next(iter(known.values()))[1]
+        reading.taken["reference_mm"] = [replace(base, i=-1, path=[head])]
+
+
+def _certified(grids: Sequence[CutSheet]) -> dict[float, tuple[float, str]]:
+    """Calibrated lengths, each with its head, by the nominal ones beside or above them; none where two of one differ."""
+    found: dict[float, set[tuple[float, str]]] = {}
+    for grid in grids:
+        pairs = [
+            (n.values, c.values, c.heading)
+            for blocks, rows in each(grid)
+            for n, c in permutations(columns_in(grid, blocks, rows), 2)
+            if (n.role, c.role) == ("nominal", "reference")
+        ]
+        rows = [row for row, own in enumerate(grid.figures) if any(own)]
+        for a, b in pairwise(rows):
+            if (said([grid.text(a, 0)]), said([grid.text(b, 0)])) == ("nominal", "reference"):
+                both = np.array([[(grid.figure(row, k) or (np.nan,))[0] for k in range(grid.width)] for row in (a, b)])
+                pairs.append((*both[:, np.isfinite(both).all(axis=0)], grid.text(b, 0)))
+        for nominal, calibrated, name in pairs:
+            for one, of_it in (
+                zip(nominal.tolist(), calibrated.tolist(), strict=True) if like(nominal, calibrated) else ()
+            ):
+                found.setdefault(one, set()).add((of_it, name))
+    alone = all(len({value for value, _ in own}) == 1 for own in found.values())
+    return {nominal: own.pop() for nominal, own in found.items()} if alone else {}
 
 
 def few_of(reading: SheetReading, grid: CutSheet, rows: Sequence[int]) -> bool:

@@ -94,6 +94,8 @@ def _refuse_far(grid: CutSheet, rows: Sequence[int], groups: Sequence[Sequence[F
     """Measured lengths that are near no reference are an error, not another table."""
     bases = [c for own in groups for c in own if c.role in ("reference", "nominal")]
     lone = [c for own in groups for c in own if c.role == "measured" and all(o.role not in BASES for o in own)]
+    least = 0.2 * min((np.nanmin(c.values) for c in bases), default=0.0)
+    lone = [c for c in lone if np.nanmax(np.abs(c.values)) > least]  # else they are deviations in columns of runs
     for k, row in enumerate(rows if bases and lone else ()):
         base, length = bases[0].values[k], lone[0].values[k]
         if not like(bases[0].values[k : k + 1], lone[0].values[k : k + 1], _FAR):
@@ -107,7 +109,7 @@ def settled_base(group: Sequence[FigureColumn], pairs: Sequence[Difference]) -> 
         return stated
     of: dict[int, set[int]] = {c.i: set() for c in group}
     for _, a, b in pairs:
-        turned = scatters(b, a) or (not scatters(a, b) and _rank(a) < _rank(b))
+        turned = not scatters(a, b) and _rank(a) < _rank(b) + scatters(b, a)
         if b.stated or (turned and not a.stated):
             a, b = b, a
         of[b.i] |= set() if b.stated else {a.i}

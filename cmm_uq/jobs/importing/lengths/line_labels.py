@@ -132,6 +132,7 @@ def _told_apart(
         elif (
             (line and not (unsaid and run is None))
             or whole
+            or (reference.max() == 0 and one[1].max() + 1 == count and not _digits(one[0]))  # a name for each
             or not (one[0].sort == "column" or (one[0].sort == "part" and _digits(one[0])))
         ):
             line.append(one)

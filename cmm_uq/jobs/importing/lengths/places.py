@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.importing.factors import LINE, hint
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
-START, END, DIRECTION = "start", "end", "direction"
+START, END, DIRECTION, CENTRE, TOWARDS = "start", "end", "direction", "centre", "towards"
+ANGLES = ("azimuth", "elevation")
+_BEHIND = {"から": START, "より": START, "에서": START, "부터": START, "まで": END, "까지": END}  # figures
 _PLAIN = r"[+-]?\d+(?:[.,]\d+)?"
 _GROUPED = r"[+-]?\d{1,3}(?:[ '’]\d{3})+(?:[.,]\d+)?|" + _PLAIN
 _PART = re.compile(rf"\s*(?:[XYZ]\s*[=:]?\s*)?({_GROUPED})\s*(?:mm|in|\")?\s*", re.I)
@@ -29,18 +30,20 @@ _LETTER = re.compile(
     rf"|(?P<bare>[XYZ])\s+(?P<word>[^\W\d]{{2,9}}\s+)?(?P<own>{_PLAIN}))(?![.,]?\d)(?:\s?mm\b)?"
     rf"(?:(?=(?P<to>{_TO})(?P<again>[XYZxyz]?)\s*[=:]?\s*(?P<end>{_GROUPED})(?![.,]?\d))|)"
 )
+_PLUS_LENGTH = re.compile(rf"{_TO}([XYZ])\s*=\s*{_PLAIN}\s*\+\s*L\b")  # as ``from X=150 to X=150+L``
 _BARE = re.compile(
     rf"(?<![\w.,+-])({_PLAIN})" + rf"(?:\s*[;/|]\s*|,\s+|,(?=[+-]?\d)|\s+)({_PLAIN})" * 2 + r"(?![.,]?\d)"
+)
+_NAMED = (
+    re.compile(rf"\bi\s*[=:]\s*({_PLAIN})\W{{1,3}}j\s*[=:]\s*({_PLAIN})\W{{1,3}}k\s*[=:]\s*({_PLAIN})", re.I),
+    re.compile(rf"\bX({_PLAIN})[ ,;/]{{1,3}}Y({_PLAIN})[ ,;/]{{1,3}}Z({_PLAIN})(?!\w)"),
 )
 _ALL_AXES = re.compile(r"X\W{0,3}Y\W{0,3}Z\W{0,3}(?:\([^)\d]*\))?\W{0,5}$", re.I)
 _AXIS = re.compile(r"(?<![A-Za-z])([+-]?)([XYZ]+)(?![A-Za-z\d]|\s*[=:]?\s*[+-]?\d)")
 _ARROW = re.compile(r"(?:→|->|=>|~|–|—|\.\.)\s*$")
-_NEAR_MM = 1.0  # by which places are rounded
 _FAR, _FAR_UNSAID = 3.0, 1.5  # of the longest length: farther are no ends of it, said to be so or not
 _ROUNDED = 0.002  # of a length, which its place may be shorter by
 _VECTOR = 2.0  # larger figures are none of a direction
-_SHOWN = 160  # characters of the words of a place
-_LABEL = 30  # characters of the name of a line elsewhere
 _LAST = 3  # words that may lead to a place
 _NEAR_WORD = 20  # characters between a word and its figures
 Point = dict[str, float]
@@ -50,10 +53,12 @@ Coordinates = tuple[int, int, Point, Point | None]
 
 @dataclass
 class Said:
-    """What texts say: coordinates of start and end, those of neither, places of which nobody says which, axes, a direction."""
+    """What texts say: coordinates of start, end and middle, others, places of which nobody says which, axes, a direction."""
 
     start: Point = field(default_factory=dict)
     end: Point = field(default_factory=dict)
+    centre: Point = field(default_factory=dict)
+    towards: Point = field(default_factory=dict)  # an end that says its direction alone
     across: Point = field(default_factory=dict)
     loose: list[Point] = field(default_factory=list)
     axes: set[str] = field(default_factory=set)
@@ -67,15 +72,24 @@ class Said:
     @property
     def whole(self) -> bool:
         """Whether it has a place, and says what of a line lies there, or two."""
-        return any(len(one) == 3 for one in (self.start, self.end)) or len(self.loose) > 1
+        centred = self.centre if self.way or self.axes else {}
+        return any(len(one) == 3 for one in (self.start, self.end, self.towards, centred)) or len(self.loose) > 1
 
 
 def role_of(text: str, *, after: bool = False) -> str:
     """What words ahead of figures say of them; of those with two letters the last, or ``after`` other figures the first."""
     words = plain_words(text)
     least = {len(words) - 1, *([0] if after else [])}
-    found = (_role(word) for k, word in [*enumerate(words)][::-1] if len(word) > 2 or not word.isascii() or k in least)
-    return next(filter(None, found), "")
+    turned = [(k, _role(word)) for k, word in enumerate(words) if len(word) > 2 or not word.isascii() or k in least][
+        ::-1
+    ]
+    # words after one for a direction are of something else
+    turned = [(k, role) for k, role in turned if role != DIRECTION or all(map(_short, words[k + 1 :]))]
+    return next((role for _, role in turned if role), "")
+
+
+def _short(word: str) -> bool:
+    return len(word) < len("with") and word.isascii()
 
 
 def role_among(text: str) -> str:
@@ -116,14 +130,26 @@ def said_in(texts: Iterable[str], sign: str = ".") -> Said:
     planes = set[str]().union(*map(_planes, texts))
     for text in texts:
         plain = unicodedata.normalize("NFKC", text).replace("−", "-")
+        said.axes |= {f"+{one[1]}" for one in _PLUS_LENGTH.finditer(plain)}
+        plain = _PLUS_LENGTH.sub("", plain)
         last, before = 0, False
         for start, end, values, to in _figures(plain, sign, planes):
             gap, place = plain[last:start], to is None or len(values) == 3
             role = role_of(re.split(r"\d", gap)[-1], after=before) or (END if before and _ARROW.search(gap) else "")
+            role = next(
+                (of for word, of in _BEHIND.items() if plain[end : end + 5].lstrip(" m").startswith(word)), role
+            )
+            role = DIRECTION if plain[start] in "iI" else "" if role in ANGLES else role
             if role == DIRECTION and len(values) == 3 and max(map(abs, values.values())) <= _VECTOR:
                 said.take(said.way, values)
             elif role == START or to:
                 said.take(said.start, values)
+            elif role == TOWARDS and place:
+                said.take(said.towards, values)
+            elif role == CENTRE and place and said.centre in ({}, values):
+                said.centre = values
+            elif role == CENTRE and place:  # of the balls at both ends
+                said.loose, said.centre = [*said.loose, *([said.centre] if said.centre else []), values], {}
             elif role == END or (role and place):
                 said.take(said.end, values)
             elif place:
@@ -145,6 +171,9 @@ def _figures(text: str, sign: str, planes: Collection[str] = ()) -> list[Coordin
     """Coordinates in a text: three in brackets, behind the letters of all axes or behind a word; each behind its letter."""
     found: list[Coordinates] = []
     planes = planes or _planes(text)
+    for match in (match for pattern in _NAMED for match in pattern.finditer(text)):
+        own = {axis: _value(one, sign) or 0.0 for axis, one in zip("XYZ", match.groups(), strict=True)}
+        found.append((match.start(), match.end(), own, None))
     for match in _BRACKET.finditer(text):
         if (three := _three(match[1], sign)) is not None:
             found.append((match.start(), match.end(), dict(zip("XYZ", three, strict=True)), None))
@@ -213,16 +242,19 @@ def _value(text: str, sign: str) -> float | None:
     return float(re.sub(r"(?<=\d)[ '’](?=\d)", "", text).replace(",", "."))
 
 
-def _full(point: Point, *others: Point) -> Floats | None:
+def full_place(point: Point, *others: Point) -> Floats | None:
     """A place, with coordinates of others where it has none; ``None`` where one is not there."""
     own = {axis: value for one in reversed((point, *others)) for axis, value in one.items()}
     return np.array([own[axis] for axis in "XYZ"]) if len(own) == 3 else None
 
 
-def place_of_line(said: Sequence[Said], longest: float, near: float, others: Sequence[Floats] = ()) -> str:
+def place_of_line(
+    said: Sequence[Said], longest: float, near: float, others: Sequence[Floats] = (), *, alone: bool = False
+) -> str:
     """Where a line lies, in the unit of the texts, as ``LINE_PLACE`` has it; with ``?`` for what is open, empty where all is.
 
-    said : of each of its rows; longest : of its lengths; near : by what places are rounded; others : starts of other lines.
+    said : of each of its rows; longest : of its lengths; near : by what places are rounded; others : starts of other lines;
+    alone : whether it has one length, which lies about its middle.
     """
     axes = set[str]().union(*(one.axes for one in said))
     letters = {axis[-1] for axis in axes}
@@ -232,32 +264,39 @@ def place_of_line(said: Sequence[Said], longest: float, near: float, others: Seq
         start, end = one.start, one.end
         if len(one.loose) == 2 and not start and not end:
             (start, end), said_so = one.loose, False
-        elif len(one.loose) == 1 and bool(start) != bool(end):
+        elif len(one.loose) == 1 and bool(start) != bool(end or one.towards):
             start, end = (start, one.loose[0]) if start else (one.loose[0], end)
         else:
             whole.odd |= bool(one.loose)
         whole.odd |= one.odd
-        for into, values in ((whole.across, one.across), (whole.way, one.way), (whole.start, start)):
+        if len(one.towards) == len(start) == 3:
+            whole.take(whole.way, {axis: one.towards[axis] - start[axis] for axis in start})
+        each = ((whole.across, one.across), (whole.way, one.way), (whole.start, start), (whole.centre, one.centre))
+        for into, values in each:
             whole.take(into, values)
-        starts += [own for own in (_full(start, one.across),) if own is not None]
-        ends += [own for own in (_full(end, one.across, start),) if end and own is not None]
+        starts += [own for own in (full_place(start, one.across),) if own is not None]
+        ends += [own for own in (full_place(end, one.across, start),) if end and own is not None]
     if whole.odd:
         return ""
+    vector = np.array([whole.way.get(one, float(one == axis)) for one in "XYZ"])
+    if not starts and len(whole.centre) == 3 and alone and vector.any():
+        ends = [full_place(whole.centre) + longest * half * vector / np.linalg.norm(vector) for half in (-0.5, 0.5)]
+        return f"from {place_text(ends[0])} to {place_text(ends[1])}"
     if starts and (ends or whole.way):
-        most = longest * (_FAR if said_so else _FAR_UNSAID)
-        return _from_to(starts[0], ends, whole.way, axis, longest, most, near)
+        between = (longest * (1 - _ROUNDED) - near, longest * (_FAR if said_so else _FAR_UNSAID))
+        return _from_to(starts[0], ends, whole.way, axis, longest, between, near)
     if starts and axis:
         i = "XYZ".index(axis)
         sense = _sense(axes, starts[0][i], longest, [one[i] for one in others])
-        return f"along {sense.removeprefix('+')}{axis} from {_text(starts[0])}" if sense else ""
+        return f"along {sense.removeprefix('+')}{axis} from {place_text(starts[0])}" if sense else ""
     known = whole.across | whole.start
     at = ",".join(f"{known[one]:.10g}" if one in known else "?" for one in "XYZ")
     return f"along {axis} from {at}" if axis else ""
 
 
 def _from_to(
-    start: Floats, ends: Sequence[Floats], way: Point, axis: str, longest: float, most: float, near: float
-) -> str:
+    start: Floats, ends: Sequence[Floats], way: Point, axis: str, longest: float, between: tuple[float, float], near: float
+) -> str:  # fmt: skip
     """A line from its start to the farthest of its ends, which lie in one direction and as far as its lengths need."""
     if way:
         vector = np.array([way[one] for one in "XYZ"])
@@ -266,8 +305,8 @@ def _from_to(
     reach = float(np.linalg.norm(far - start))
     off = [float(np.linalg.norm(np.cross(far - start, end - start))) / max(reach, 1e-9) for end in ends]
     off += [reach - abs(float((far - start)["XYZ".index(axis)]))] if axis else []
-    fits = max(off) <= near and longest * (1 - _ROUNDED) - near <= reach <= most
-    return f"from {_text(start)} to {_text(far)}" if fits else ""
+    fits = max(off) <= near and between[0] <= reach <= between[1]
+    return f"from {place_text(start)} to {place_text(far)}" if fits else ""
 
 
 def _sense(axes: set[str], start: float, longest: float, others: Sequence[float]) -> str:
@@ -278,97 +317,10 @@ def _sense(axes: set[str], start: float, longest: float, others: Sequence[float]
     return "+" if up > down or (up == down == 0 and 0 <= start < longest) else ""
 
 
-def _text(point: Floats) -> str:
+def place_text(point: Floats) -> str:
     return ",".join(f"{one:.10g}" for one in point)
 
 
 def says_figures(text: str) -> bool:
     """Whether a text has coordinates."""
     return any(_figures(unicodedata.normalize("NFKC", one), ".") for one in text.split("\n"))
-
-
-def stated_places(
-    names: Sequence[str],
-    texts: Sequence[str],
-    elsewhere: Sequence[tuple[str, str]],
-    measured_mm: Sequence[float],
-    mm: float,
-    sign: str,
-) -> dict[str, tuple[str, str]]:
-    """Where lines lie by the texts of each of their lengths, in mm with ``?`` for what is open, and the words that say it.
-
-    elsewhere : rows that are no lengths, each with its first cell; they speak of the line whose name they have, or its number.
-    """
-    rows: dict[str, dict[str, float]] = {name: {} for name in names}
-    for name, text, length in zip(names, texts, measured_mm, strict=True):
-        rows[name][text] = max(rows[name].get(text, 0.0), length)
-    starts = {name: _starts(own, sign) for name, own in rows.items()}
-    found = {}
-    for name, own in rows.items():
-        for more in ((), _about(name, rows, elsewhere)):
-            said = [said_in([*text.split("\n"), *more], sign) for text in own]
-            others = [one for other, starts_ in starts.items() if other != name for one in starts_]
-            place = place_of_line(said, max(own.values()) / mm, _NEAR_MM / mm, others)
-            if place and (name not in found or "?" not in place):
-                words = "; ".join(
-                    dict.fromkeys(
-                        one for text in (*own, "\n".join(more)) for one in text.split("\n") if says_figures(one)
-                    )
-                )
-                found[name] = _in_mm(place, mm), words[:_SHOWN]
-            if place and "?" not in place:
-                break
-    return found
-
-
-def _starts(texts: Iterable[str], sign: str) -> list[Floats]:
-    each = (said_in(text.split("\n"), sign) for text in texts)
-    return [own for said in each if (own := _full(said.start, said.across)) is not None][:1]
-
-
-def _about(name: str, names: Collection[str], elsewhere: Sequence[tuple[str, str]]) -> list[str]:
-    """Texts elsewhere with the name of a line up to that of another, or its number where each has its own; of one line all."""
-    numbers = {one: re.findall(r"\d+", one) for one in names}
-    apart = len({*map(tuple, numbers.values())}) == len(names) and all(len(own) == 1 for own in numbers.values())
-    own = {
-        first for first, _ in elsewhere if len(first) < _LABEL and apart and re.findall(r"\d+", first) == numbers[name]
-    }
-    found = [text for first, text in elsewhere if len(names) == 1 or first in own | {name}]
-    called = {one: one for one in names if not one.isdigit() and len(one) > 1}
-    called |= {part: one for one in names for part in re.findall(r"\b[^\W\d_]+\d+\b", one)}  # as P1 of ``Position P1``
-    words = (re.escape(one) for one in sorted(called, key=len, reverse=True))
-    pattern = re.compile(rf"(?<!\w)(?:{'|'.join(words) or '(?!)'})(?!\w)")
-    for _, text in elsewhere:
-        parts = [*pattern.finditer(text)]
-        ends = [*(part.start() for part in parts[1:]), len(text)] if parts else []
-        found += [text[part.start() : end] for part, end in zip(parts, ends, strict=True) if called[part[0]] == name]
-    return [line for text in dict.fromkeys(found) for line in text.split("\n")]
-
-
-def place_of_axis(axis: str, texts: Iterable[str], mm: float, sign: str) -> tuple[str, str] | None:
-    """Where a run along an axis lies, its scale at 0, in mm: where a text that names it gives both other coordinates."""
-    found: dict[str, str] = {}
-    for text in texts:
-        said = said_in([text], sign)
-        named = hint(text, lengths=True) == LINE or {one[-1] for one in said.axes} == {axis}
-        if {*said.across} == {*"XYZ"} - {axis} and named and not said.odd:
-            place = f"along {axis} from {_text(np.array([(said.across | {axis: 0.0})[one] for one in 'XYZ']))}"
-            found[_in_mm(place, mm)] = text
-    return found.popitem() if len(found) == 1 else None
-
-
-def _in_mm(place: str, mm: float) -> str:
-    return (
-        place if mm == 1 else re.sub(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?", lambda one: f"{float(one[0]) * mm:.10g}", place)
-    )
-
-
-def proposed(place: str) -> tuple[str, str]:
-    """A place as far as a file says it, and an example of one.
-
-    Examples
-    --------
-    >>> proposed("along Y from ?,?,?"), proposed("along X from ?,800,400")[0]
-    (('', 'along Y from 100,200,300'), 'along X from ?,800,400')
-    """
-    return place if re.search(r"\d", place) else "", place.replace("?,?,?", "100,200,300") or "along X from 100,200,300"

@@ -83,7 +83,8 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     small = [c for c in columns if c not in near and c.role != "summary"]
     if near and (base := settled_base(near, differences(near, small))) is not None:
         return base
-    far = [c for c in large if c.role is None and np.ptp(c.values[np.isfinite(c.values)]) > 10 * _OFF_MM]
+    large = [c for c in large if c.role is None and not way_of(c.heading)]
+    far = [c for c in large if np.ptp(c.values[np.isfinite(c.values)]) > 10 * _OFF_MM]
     return far[0] if len(far) == 1 else None
 
 

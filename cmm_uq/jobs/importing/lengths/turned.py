@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmm_uq.jobs.importing.blocks import CutSheet
-from cmm_uq.jobs.importing.factors import hint
+from cmm_uq.jobs.importing.factors import LINE, hint
 from cmm_uq.jobs.importing.format import Cell, Sheet
 from cmm_uq.jobs.importing.lengths.length_columns import BASES
 from cmm_uq.jobs.importing.roles import like, said
@@ -34,8 +34,13 @@ class AcrossPart:
 def turned(grid: CutSheet) -> Sheet | None:
     """A sheet with each such part of it turned, and whatever else it holds as it is; ``None`` where there is none."""
     sheet, rows, lines, found, i = grid.sheet, list[Sequence[Cell]](), list[int](), 0, 0
+    bases: AcrossPart | None = None
     while i < len(sheet.rows):
         part = _part(grid, i)
+        if part is not None and all(_named_base(grid, row, part) for row in part.rows):
+            bases, part = part, None  # of all parts below it
+        elif part is not None and bases is not None and _of(grid, part, bases) and not _named_base(grid, i, part):
+            part.rows = [*bases.rows, *part.rows]
         if part is None:
             rows.append(sheet.rows[i])
             lines.append(sheet.lines[i])
@@ -56,13 +61,26 @@ def turned(grid: CutSheet) -> Sheet | None:
             texts[: len(part.over)] = [""] * len(part.over)
             texts[len(part.over)] = part.name if several or not any(above) else above[k]
             named = f"{names[0]} {{}}" if names else "({})"
-            rows.append([named.format(text) if text.isdigit() else text for text in texts])
+            line = bool(names) and hint(names[0], lengths=True) == LINE and len({*texts[len(part.over) + 1 :]}) > 1
+            plain = [bool(text) and said([text]) is None and not hint(text, lengths=True) for text in texts]
+            each = zip(texts, plain, strict=True)
+            rows.append([named.format(text) if text.isdigit() or (line and bare) else text for text, bare in each])
         own = [sheet.rows[row] for row in (*part.over, *part.rows)]
         rows += [[cells[k] if k < len(cells) else "" for cells in own] for k in part.columns]
         # of a row further down, so that what stands above is a title, and no head
-        lines += [sheet.lines[part.rows[1]]] * (len(rows) - len(lines))
+        lines += [sheet.lines[max(part.rows[1], i)]] * (len(rows) - len(lines))
         i = part.rows[-1] + 1
     return replace(sheet, rows=rows, lines=lines, spreadsheet=False) if found else None
+
+
+def _named_base(grid: CutSheet, row: int, part: AcrossPart) -> bool:
+    return said([grid.text(row, k) for k in range(part.columns[0])]) in BASES
+
+
+def _of(grid: CutSheet, part: AcrossPart, bases: AcrossPart) -> bool:
+    """Whether the first row of a part may be of references above it."""
+    values = (grid.column([part.rows[0], bases.rows[-1]], k)[0] for k in bases.columns)
+    return part.columns == bases.columns and like(*np.array([*values]).T)
 
 
 def _part(grid: CutSheet, i: int) -> AcrossPart | None:
