@@ -276,8 +276,8 @@ class CutSheet:
         found = {places.START: [i for i, _ in six[:3]], places.END: [i for i, _ in six[3:]]}
         others = [i for i in range(self.width) if i not in dict(six) and self._as_far(block, found, i)]
         rows = [row for row in block.rows if all(self.figure(row, i) for i, _ in six)]
-        step, fine = (min((f[1] for row in rows for i in own if (f := self.figure(row, i))), default=1.0)
-                      for own in (dict(six), others))  # fmt: skip
+        finest = [[f[1] for row in rows for i in own if (f := self.figure(row, i))] for own in (dict(six), others)]
+        step, fine = (min(own, default=1.0) for own in finest)
         # finer ones are measured balls, unless a length beside them is much finer still
         return found if others and (step >= _MEASURED or fine * FINER <= step) else by_words
 

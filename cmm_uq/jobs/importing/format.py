@@ -128,10 +128,8 @@ def sources_of(sources: Sources) -> list[Source]:
     return sources if isinstance(sources, list) else [sources]
 
 
-Encoding = Literal[
-    "utf-8", "utf-16", "latin-1", "cp1250", "cp1251", "cp1252", "cp1253", "cp1254", "cp850", "cp852", "cp866", "cp932",
-    "gb18030", "cp949", "big5",
-]  # fmt: skip
+WesternEncoding = Literal["utf-8", "utf-16", "latin-1", "cp1250", "cp1252", "cp1254", "cp850", "cp852"]
+Encoding = Literal[WesternEncoding, "cp1251", "cp1253", "cp866", "cp932", "gb18030", "cp949", "big5"]
 
 
 class FileKeys(JobTable):

@@ -71,10 +71,11 @@ def words_of(table: str) -> Mapping[str, frozenset[str]]:
 # Japanese and Korean beside a letter is a word of its own
 _WORDS = re.compile(r"[^\W\d_\u3040-\u9fff\uac00-\ud7a3]+|[\u3040-\u9fff\uac00-\ud7a3]+|\d+")
 # letters that are none with an accent, characters in their simplified form; signs after a number
-_SAME = str.maketrans(
-    "łøđı標稱準測誤實際長線軸點對対參極負數離徑圓値單単復環規階週塊處間終檢",
-    "lodi标称准测误实际长线轴点对对参极负数离径圆值单单复环规阶周块处间终检", "ªº°",
-)  # fmt: skip
+_TRADITIONAL, _SIMPLIFIED = (
+    "標稱準測誤實際長線軸點對対參極負數離徑圓値單単復環規階週塊處間終檢",
+    "标称准测误实际长线轴点对对参极负数离径圆值单单复环规阶周块处间终检",
+)
+_SAME = str.maketrans(f"łøđı{_TRADITIONAL}", f"lodi{_SIMPLIFIED}", "ªº°")
 _COLUMNS = {phrase: column for column, phrases in words_of("columns").items() for phrase in phrases}
 _AXIS = words_of("axis")  # words beside the letter of an axis, those that leave it a coordinate among them
 _NOMINAL, _SMALL, _POINT = _AXIS["nominal"], _AXIS["small"], words_of("columns")["point"]

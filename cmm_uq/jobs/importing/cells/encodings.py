@@ -35,18 +35,16 @@ _WESTERN = "äöüß àâæçéèêëîïôùûüÿœ àèéìíîòóùú áé�
 _EASTERN = "áčďéěíňóřšťúůýžôľĺŕä ąćęłńóśźż áéíóöőúüű ăâîşţșț čćđšž"
 _CYRILLIC = "абвгдежзийклмнопрстуфхцчшщъыьэюяё№ґєії"
 # letters beside a to z of one language each
-_ALPHABETS = {
-    "cp1252": _WESTERN, "cp1250": _EASTERN, "cp1254": "çğıiöşüâîû", "cp1251": _CYRILLIC,
-    "cp1253": "αβγδεζηθικλμνξοπρστυφχψωςάέήίόύώϊϋΐΰ", "cp850": _WESTERN, "cp852": _EASTERN, "cp866": _CYRILLIC,
-}  # fmt: skip
+_ALPHABETS = {"cp1252": _WESTERN, "cp1250": _EASTERN, "cp1254": "çğıiöşüâîû", "cp1251": _CYRILLIC}
+_ALPHABETS |= {"cp1253": "αβγδεζηθικλμνξοπρστυφχψωςάέήίόύώϊϋΐΰ"}
+_ALPHABETS |= {"cp850": _WESTERN, "cp852": _EASTERN, "cp866": _CYRILLIC}
 _LAST_LATIN = "\u024f"
 _SIGNS = {*"µμ°±²³«»–—„“”‚‘’…·×÷§©®€ΔΩ∅≤≥¼½¾¹ªº†•™\u00a0\u202f\ufeff"}
 _DIAMETER = re.compile(r"(?<![^\W\d_])Ø(?![^\W\d_])")
 _WITHIN = re.compile(r"(?<=[^\W\d_])[³²¹¿¾¼½ªº](?=[^\W\d_])")  # a word, in which signs are letters of another encoding
 # first and last bytes, ahead of the frequent ideographs or syllables of two, by which those standards begin; least second byte
-_LEADS = {
-    "cp932": (0x81, 0x98, 0x40), "cp949": (0xA1, 0xC8, 0xA1), "gb18030": (0xA1, 0xD7, 0xA1), "big5": (0xA1, 0xC6, 0x40)
-}  # fmt: skip
+_LEADS = {"cp932": (0x81, 0x98, 0x40), "cp949": (0xA1, 0xC8, 0xA1)}
+_LEADS |= {"gb18030": (0xA1, 0xD7, 0xA1), "big5": (0xA1, 0xC6, 0x40)}
 _SAMPLE = 5000  # characters by which an encoding is known
 _FIX = "Export it again, or name encoding"
 _REPORT_LINE = 2000  # characters of a line of a report, which has 80 to 200

@@ -283,8 +283,8 @@ def place_of_line(
         ends = [full_place(whole.centre) + longest * half * vector / np.linalg.norm(vector) for half in (-0.5, 0.5)]
         return f"from {place_text(ends[0])} to {place_text(ends[1])}"
     if starts and (ends or whole.way):
-        between = (longest * (1 - _ROUNDED) - near, longest * (_FAR if said_so else _FAR_UNSAID))
-        return _from_to(starts[0], ends, whole.way, axis, longest, between, near)
+        lengths = (longest * (1 - _ROUNDED) - near, longest, longest * (_FAR if said_so else _FAR_UNSAID))
+        return _from_to(starts[0], ends, whole.way, axis, lengths, near)
     if starts and axis:
         i = "XYZ".index(axis)
         sense = _sense(axes, starts[0][i], longest, [one[i] for one in others])
@@ -295,17 +295,17 @@ def place_of_line(
 
 
 def _from_to(
-    start: Floats, ends: Sequence[Floats], way: Point, axis: str, longest: float, between: tuple[float, float], near: float
-) -> str:  # fmt: skip
+    start: Floats, ends: Sequence[Floats], way: Point, axis: str, lengths: Sequence[float], near: float
+) -> str:
     """A line from its start to the farthest of its ends, which lie in one direction and as far as its lengths need."""
     if way:
         vector = np.array([way[one] for one in "XYZ"])
-        ends = [start + longest * vector / max(float(np.linalg.norm(vector)), 1e-9)]
+        ends = [start + lengths[1] * vector / max(float(np.linalg.norm(vector)), 1e-9)]
     far = max(ends, key=lambda end: float(np.linalg.norm(end - start)))
     reach = float(np.linalg.norm(far - start))
     off = [float(np.linalg.norm(np.cross(far - start, end - start))) / max(reach, 1e-9) for end in ends]
     off += [reach - abs(float((far - start)["XYZ".index(axis)]))] if axis else []
-    fits = max(off) <= near and between[0] <= reach <= between[1]
+    fits = max(off) <= near and lengths[0] <= reach <= lengths[2]
     return f"from {place_text(start)} to {place_text(far)}" if fits else ""
 
 

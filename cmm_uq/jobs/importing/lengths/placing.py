@@ -79,8 +79,8 @@ def _parts(text: str, names: Collection[str]) -> list[tuple[str, str]]:
     """Names of lines in a text, each with what follows up to the next."""
     called = {one: one for one in names}
     called |= {part: one for one in names for part in re.findall(r"\b[^\W\d_]+\d+\b", one)}  # as P1 of ``Position P1``
-    called |= {rest: one for one in names if len(two := one.split(" ", 1)) > 1 and len(rest := two[1]) > 2
-               and hint(two[0], lengths=True) == LINE}  # fmt: skip
+    lined = (one.split(" ", 1) for one in names if hint(one.split(" ", 1)[0], lengths=True) == LINE)
+    called |= {own[1]: " ".join(own) for own in lined if len(own[-1]) > 2 and len(own) > 1}
     words = (
         re.escape(one) + r"(?=\s*[=:]\s*[^\s\d+-])" * (one.isdigit() or len(one) == 1)  # then ``A = along …``
         for one in sorted(called, key=len, reverse=True)
