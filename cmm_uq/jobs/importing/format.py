@@ -47,11 +47,13 @@ LENGTH, TEMPERATURE, TIME, PRESSURE, SHARE = "length", "temperature", "time", "p
 _UNITS = (
     (
         WrittenUnit("mm", LENGTH),
-        "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros milimetr мм ㎜ 毫米 밀리미터 ミリ",
+        "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros milimetr мм ㎜ 毫米 밀리미터 ミリ"
+        " millimètre millimètres milímetro milímetros milimetry millimetro ミリメートル",
     ),
     (
         WrittenUnit("um", LENGTH, 1, 1000),
-        "µm um μm ㎛ 微米 micrometer micrometre micron microns mikrometer mikron micrometri мкм микрометр",
+        "µm um μm ㎛ 微米 micrometer micrometre micron microns mikrometer mikron micrometri мкм микрометр"
+        " micrometers micrometres micromètre micromètres micrómetro micrómetros",
     ),
     (WrittenUnit("nm", LENGTH, 1, 1_000_000), "nm nanometer nanometre"),
     (WrittenUnit("microinch", LENGTH, 127, 5_000_000), "microinch microinches µin μin uin µpo μpo"),

@@ -44,6 +44,7 @@ from cmm_uq.jobs.importing.format import (
     Sheet,
     length_named,
     sheets_of,
+    unit_named,
 )
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 from cmm_uq.jobs.importing.lengths.placing import place_of_axis
@@ -228,9 +229,9 @@ class _Runs:
             elif match := _KEY.fullmatch(text):
                 part = match[1].lower()
                 self.facts.setdefault(part, match[2].strip())
-            elif section == "TARGET DATA" and part == "targets":
+            elif section in ("TARGET DATA", "TARGETS") and part == "targets":
                 self.targets += self._figures(text, f"{where} line {number}")
-            elif section == "DEVIATIONS" and part.startswith("run target data"):
+            elif section in ("DEVIATIONS", "DATA") and part.startswith("run target data"):
                 figures = self._figures(text, f"{where} line {number}")
                 run, target, deviation = figures if len(figures) == _TRIPLE else (0.0, 0.0, 0.0)
                 if run % 1 or target % 1 or not 1 <= target <= len(self.targets):
@@ -240,6 +241,8 @@ class _Runs:
 
     def _check(self, where: str) -> None:
         kind = self.facts.get("owner", "")
+        if (unit := self.facts.get("error-units")) and unit_named(unit) != UNITS["um"]:
+            raise CmmUqError(f"has deviations in {unit!r}", where=where, fix="Export them in micrometres")
         names = ["owner", "filetype"] + ["file type"] * ("renishaw" in kind.lower())  # else its owner is its kind
         if not {self.facts.get(name, "").lower() for name in names} & _LINEAR:
             problem = f"holds a measurement of the kind {kind!r}, whose unit no public text says"
@@ -261,7 +264,7 @@ class _Runs:
 
 class Rtl(TextReport):
     name, title = "rtl", say("Laser interferometer (RTL)")
-    shows = (re.compile(r"^\s{0,9}TARGET DATA::", re.M), re.compile(r"^\s{0,9}Target-count\s{0,9}:", re.M))
+    shows = (re.compile(r"^\s{0,9}TARGET(?: DATA|S)::", re.M), re.compile(r"^\s{0,9}Target-count\s{0,9}:", re.M))
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         sheets = super().read(content, where, keys)

@@ -33,7 +33,8 @@ def below_deviations(grid: CutSheet, rows: Iterable[int]) -> set[int]:
 def is_void(row: Sequence[Cell], *tables: str) -> bool:
     """Whether a cell of a row says that it is no measured point or length."""
     known = frozenset().union(*(words_of("rows")[table] for table in tables))
-    return any(isinstance(cell, str) and " ".join(plain_words(cell)) in known for cell in row)
+    texts = (cell for cell in row if isinstance(cell, str) and not (len(cell) == 1 and cell.isascii()))  # as O, for oui
+    return any(" ".join(plain_words(text)) in known for text in texts)
 
 
 def of_feature(grid: CutSheet, row: int) -> bool:

@@ -79,7 +79,8 @@ class Said:
 def role_of(text: str, *, after: bool = False) -> str:
     """What words ahead of figures say of them; of those with two letters the last, or ``after`` other figures the first."""
     words = plain_words(text)
-    least = {len(words) - 1, *([0] if after else [])}
+    label = len(words) > 1 and re.search(r"(?<!\w)[A-Z]\W*$", text)  # as of ``ball A``
+    least = {len(words) - (2 if label else 1), *([0] if after else [])}
     turned = [(k, _role(word)) for k, word in enumerate(words) if len(word) > 2 or not word.isascii() or k in least][
         ::-1
     ]
