@@ -94,6 +94,12 @@ def test_warning_and_action_of_one_value(ratios: list[float], standings: list[st
     assert [one.ratio for one in found] == pytest.approx(ratios)
 
 
+def test_a_check_that_is_reported_again_is_no_second_one() -> None:
+    once = check(1, 2.1)
+    assert [one.standing for one in check_standings(CALIBRATION, [once, once])] == ["warning", "warning"]
+    assert [one.standing for one in check_standings(CALIBRATION, [once, once, check(2, 2.1)])][-1] == "action"
+
+
 def test_with_another_artefact_the_whole_uncertainty_counts() -> None:
     """The same difference is 3.1·√0.18/√0.5 = 1.86 standard uncertainties."""
     assert [one.standing for one in check_standings(CALIBRATION, [check(1, 3.1, artefact="BB-8")])] == ["in control"]
