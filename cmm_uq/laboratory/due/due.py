@@ -174,12 +174,16 @@ def _due_date(
         return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted))), False
     if last.decision in BEYOND:
         return last.day, say("its last certificate finds it beyond its limits"), True
-    known, rule = of.certificates, of.rule
-    # the drift model takes checks after the calibration too; other methods count what calibrations found
-    seen = known if rule.method == "drift" else known[: known.index(last) + 1]
-    interval = interval_by(rule, seen, pool, of.priors)
+    rule, at = of.rule, of.certificates.index(last) + 1
+    own, later = of.certificates[:at], [one for one in of.certificates[at:] if one.interim]
+    seen = [own]
+    if rule.method == "drift":  # takes checks after the calibration too; other methods count what calibrations found
+        seen = [[*own, *later]]
+        if last.state == "released" and any(one.state == "draft" for one in later):  # which make no day later
+            seen.append([*own, *(one for one in later if one.state != "draft")])
+    interval = min((interval_by(rule, each, pool, of.priors) for each in seen), key=lambda one: _ends(last.day, one))
     planned = _ends(last.day, interval)
-    checks = check_standings(last, [one for one in known[known.index(last) + 1 :] if one.interim])
+    checks = check_standings(last, later)
     return *_checked(rule, last, planned, interval.why, checks), any(one.standing == "action" for one in checks)
 
 
@@ -199,7 +203,7 @@ def _checked(
     at = day(one.certificate.day)
     if one.standing == "action":
         reason = say("the interim check of {day} is out of control ({what})", day=at, what=_furthest(one))
-        return one.certificate.day, reason
+        return min(one.certificate.day, planned), reason
     if one.standing == "warning":
         what = _furthest(one)
         return planned, say("{why}; the interim check of {day} warns ({what}): repeat it", why=why, day=at, what=what)

@@ -136,6 +136,7 @@ def test_a_check_out_of_control_makes_the_machine_due_at_once() -> None:
     day = dt.date(2024, 6, 1)
     found = due(certificate(FIRST_of_made), check(day, 1 + 3.1 * 0.5**0.5))
     assert found.due == day
+    assert due(certificate(FIRST_of_made), check(day, 7.0), rule={"every_months": 1}).due == dt.date(2024, 4, 1)
     assert "quantity scale_x.ppm: 3.1 standard uncertainties" in found.why
 
 
@@ -256,6 +257,25 @@ def test_by_the_drift_model_a_machine_is_due_when_its_history_says_that_its_limi
     assert crossed.keys() == {"scale_x.ppm", "scale_y.ppm"}
     assert "drift model without a fleet: quantity scale_x.ppm has not crossed its limit with 95 %" in found.why
     assert found.due != due(*done[:3], rule={"method": "drift", "reliability": 0.95}).due
+
+
+@pytest.mark.parametrize("interim", [False, True])
+def test_by_the_drift_model_no_draft_makes_a_day_later(interim: bool) -> None:
+    """One that finds it nearer to zero; released, it does, and one that finds it farther makes the day sooner."""
+    days = [FIRST_of_made - dt.timedelta(days=one) for one in (700, 350, 0)]
+    done = [
+        certificate(day, value(x), entry=i) for i, (day, x) in enumerate(zip(days, (0.0, 1.5, 3.2), strict=True), 1)
+    ]
+
+    def with_one(number: float, after: int, state: str) -> dt.date | None:
+        one = certificate(days[-1] + dt.timedelta(days=after), value(number), entry=4, state=state, interim=interim)
+        return due(*done, one, rule={"method": "drift", "reliability": 0.95}).due
+
+    alone = due(*done, rule={"method": "drift", "reliability": 0.95}).due
+    assert alone is not None
+    assert with_one(3.2, 120, "draft") == alone
+    assert (with_one(3.2, 120, "released") or alone) > alone
+    assert (with_one(6.0, 60, "draft") or alone) < alone
 
 
 DAYS, VALUES = [0, 360, 740, 1100], [1.0, 1.9, 3.4, 3.8]
