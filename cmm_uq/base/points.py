@@ -195,6 +195,29 @@ class Points:
         by_chance = set() if read or not found else _rounded_alike(self)
         return {later: original for later, original in found.items() if later not in by_chance}
 
+    @cached_property
+    def read_as_certified(self) -> int:
+        """Distances from the first point of their group that equal their reference to the last digit; 0 where that may be.
+
+        It may be of fewer than nine in ten, and where repeats differ by no more than the digits: else references were made of
+        the readings, which then show no error.
+        """
+        references = [self.columns[name] for name in _REFERENCES if name in self.columns]
+        if not references:
+            return 0
+        both, first = (self.xyz, np.column_stack(references)), np.zeros(len(self), dtype=np.int64)
+        for rows in self.rows_of_groups:
+            first[rows] = rows[np.argmin(self.point[rows])]
+        others = first != np.arange(len(self))
+        read, certified = (np.linalg.norm(of - of[first], axis=1)[others] for of in both)
+        _, same = np.unique(np.column_stack([self.measurement, self.point])[others], axis=0, return_inverse=True)
+        times = np.bincount(same.ravel())
+        off = read - (np.bincount(same.ravel(), read) / times)[same.ravel()]
+        digit = max(1e-9, *(_step(np.unique(of)) for of in both))
+        freedoms, equal = int(np.sum(times - 1)), int(np.sum(np.abs(read - certified) <= digit))
+        scattered = freedoms > 0 and float(np.sqrt(np.sum(off**2) / freedoms)) > 2 * digit
+        return equal if scattered and len(read) >= _SOME and equal >= 0.9 * len(read) else 0
+
     def run_of(self, group: int) -> tuple[int, int]:
         """Measurement and repeat of a group."""
         row = self.rows_of_groups[group][0]
@@ -248,6 +271,8 @@ class Points:
         return np.asarray((sums / counts)[self.group], dtype=np.float64)
 
 
+_REFERENCES = ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES))
+_SOME = 12  # lengths of which nine in ten equal their reference by chance less often than once in a thousand
 _CHANCE = 1e-3  # probability of as many equal lengths, or more, below which they are copies
 _PARALLEL = 1e9  # directions of one line agree to its inverse
 _MEDIAN = 0.6745  # of the absolute value of a normal distribution, standard deviations

@@ -62,3 +62,22 @@ def test_the_pitch_of_a_carriage_goes_by_what_it_reads_and_what_it_carries() -> 
     points = replace(points, machine=Turntable("turntable", travel_mm=travel, origin_mm=ORIGIN))
     pitch = ROTATION["x", "y"].basis(points)[:, 0, 0] * 5
     np.testing.assert_allclose(pitch, [5 * np.pi / 180 / 3600 * 0.110 * 35.0] * 2, rtol=1e-12)
+
+
+def test_references_that_were_made_of_the_readings_are_counted() -> None:
+    """Of a gauge read three times along two lines; those of its certificate are not, nor where digits hide the noise."""
+    lines, faces, random = np.eye(3)[:2], np.arange(6) * 100.0, np.random.default_rng(1)
+    number, repeat, face = (each.ravel() for each in np.meshgrid([0, 1], [1, 2, 3], np.arange(6), indexing="ij"))
+    true = faces[face][:, None] * lines[number]
+    read = np.round(true + random.normal(0, 1e-3, true.shape), 5)
+    lengths = np.linalg.norm(read - read[face == 0][number * 3 + repeat - 1], axis=1)
+
+    def counted(xyz: np.ndarray, reference: np.ndarray) -> int:
+        of = {"reference_mm": reference}
+        return Points(xyz, number + 1, face + 1, repeat, Machine("m"), of).read_as_certified
+
+    assert counted(read, np.round(lengths, 5)) == 30
+    assert counted(read, faces[face]) == 0
+    assert counted(np.round(true, 2), np.round(faces[face], 2)) == 0
+    some = np.where(random.random(len(face)) < 0.5, lengths, faces[face])
+    assert counted(read, np.round(some, 5)) == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+import shutil
 from functools import partial
 from pathlib import Path
 
@@ -191,3 +192,15 @@ def test_an_adjustment_lies_before_the_measurement(job: Path) -> None:
         else:
             with pytest.raises(CmmUqError, match="adjusted_since = 2004-09-02 is after the measurement"):
                 read_job(job)
+
+
+def test_references_that_were_made_of_the_readings_make_no_test_whole(tmp_path: Path) -> None:
+    job = tmp_path / "job"
+    shutil.copytree("examples/step-gauge-simulated", job)
+    read = np.genfromtxt(job / "recording.csv", delimiter=",", names=True)
+    xyz = np.column_stack([read[f"{axis}_mm"] for axis in "xyz"])
+    begin = np.flatnonzero(read["point"] == 1)[np.cumsum(read["point"] == 1) - 1]
+    read["reference_mm"] = np.round(np.linalg.norm(xyz - xyz[begin], axis=1), 5)
+    assert not any("readings themselves" in what for what, _ in read_job(job).circumstances.lapsed)
+    np.savetxt(job / "recording.csv", read, "%.12g", ",", header=",".join(read.dtype.names), comments="")
+    assert any("readings themselves (261 are" in what for what, _ in read_job(job).circumstances.lapsed)
