@@ -281,8 +281,8 @@ class Job:
         if beyond := int(sum(self.points.columns.get("extrapolated", ()))):
             what = say("error maps that reach all points ({count} were corrected beyond them)", count=beyond)
             lapsed += ((what, "[machine] error_map"),)
-        if copied := self.points.read_as_certified:
-            what = say("certified lengths that are not the readings themselves ({count} are equal to the last digit)", count=copied)
+        if n := self.points.read_as_certified:
+            what = say("certified lengths that are not the readings themselves ({count} are equal to the last digit)", count=n)
             lapsed += ((what, "reference_mm"),)
         return replace(
             stated, short_gauge=self.short_gauge, clauses=self.clauses, uncertainty=uncertainty, lapsed=lapsed
