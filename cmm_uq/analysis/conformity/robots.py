@@ -23,18 +23,21 @@ _FLAT = 0.02  # of the extent of five poses, by which they may lie beside a plan
 
 
 def poses(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    """Five poses, one in the middle of four, all in one plane, each thirty times."""
+    """Five poses, one in the middle of four, all in one plane, each thirty times in one measurement, as figures are of one."""
     points = artefact.points
     copied = list(points.copies) if recorded else []
-    cycles: dict[int, list[Floats]] = {}
+    cycles: dict[tuple[int, int], list[Floats]] = {}
     for row in np.flatnonzero(~np.isin(points.group, copied)).tolist():
-        cycles.setdefault(int(points.point[row]), []).append(points.xyz[row])
-    whole = {pose: np.array(each) for pose, each in cycles.items() if len(each) >= CYCLES}
+        cycles.setdefault((int(points.measurement[row]), int(points.point[row])), []).append(points.xyz[row])
+    whole: dict[int, list[Floats]] = {}
+    for (measurement, _), each in cycles.items():
+        if len(each) >= CYCLES:
+            whole.setdefault(measurement, []).append(np.mean(each, axis=0))
     what = say("{poses} poses, each commanded {cycles} times", poses=POSES, cycles=CYCLES)
-    found = [asked(what, POSES, len(whole))]
+    found = [asked(what, POSES, max(map(len, whole.values()), default=0))]
     plane = say("a pose in the middle of four others, all in one plane")
-    at = [each.mean(axis=0) for each in whole.values()]
-    found.append(Condition(plane, () if any(map(_in_a_plane, _fives(at))) else (plane,)))
+    flat = any(_in_a_plane(five) for at in whole.values() for five in _fives(at))
+    found.append(Condition(plane, () if flat else (plane,)))
     return tuple(found)
 
 

@@ -148,6 +148,14 @@ def test_poses_beside_a_plane_are_no_five_of_the_standard() -> None:
     )
 
 
+def test_cycles_of_several_measurements_are_not_thirty_of_one() -> None:
+    """Each station's own mean takes their scatter: 6 µm of pairs where thirty of one station are 10.3 µm."""
+    artefact = ARMS["ISO 9283:1998", "RP"]("complete")[0]
+    station, cycle = divmod(artefact.points.repeat - 1, 2)
+    spread = dataclasses.replace(artefact.points, measurement=station + 1, repeat=cycle + 1)
+    assert "5 poses, each commanded 30 times (0)" in lacks(("ISO 9283:1998", "RP"), of_points(artefact, spread))
+
+
 BEGUN = ("seat", "arm_sphere", "arm_orientations", "arm_lengths", "robot_poses")
 
 
