@@ -282,7 +282,9 @@ class Job:
             what = say("error maps that reach all points ({count} were corrected beyond them)", count=beyond)
             lapsed += ((what, "[machine] error_map"),)
         if n := self.points.read_as_certified:
-            what = say("certified lengths that are not the readings themselves ({count} are equal to the last digit)", count=n)
+            what = say(
+                "certified lengths that are not the readings themselves ({count} are equal to the last digit)", count=n
+            )
             lapsed += ((what, "reference_mm"),)
         return replace(
             stated, short_gauge=self.short_gauge, clauses=self.clauses, uncertainty=uncertainty, lapsed=lapsed
