@@ -12,6 +12,7 @@ from cmm_uq.certificate import clauses, document, origin as origins
 from cmm_uq.certificate.clauses import claimed, traceability
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
+from cmm_uq.certificate.plots.machine import machine_section
 from cmm_uq.certificate.result import Outcome, Page, Result, StatedUncertainty
 from cmm_uq.certificate.results.contents import results
 from cmm_uq.certificate.results.provenance import COMPARED, NOT_COMPARED, REBUILT
@@ -185,7 +186,7 @@ def _certificate(result: Result, page: Page, warned: tuple[Text, ...]) -> Docume
     diagnosis = diagnosis_sections(result.diagnosed) if job.facts.job.diagnosis_on_certificate else ()
     sections = [
         *of_result.with_first(result, [*_ordered(result, page.sections(result)), *of_result.tolerance_sections(result)]),
-        method(result),
+        *filter(None, [machine_section(job.points.machine)]), method(result),
         *(replace(section, opinion=True) for section in (*diagnosis, posterior_section(result))),
     ]  # fmt: skip
     produced_by = say("{program}, {sampler}, seed {seed}", program=origins.program(job), sampler=Verbatim(posterior.sampler),

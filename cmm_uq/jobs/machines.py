@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -22,7 +23,7 @@ _ROUNDING = 1e-6  # of a reading, °
 
 def machine_of(facts: MachineFacts) -> Machine:
     """Of three carriages, or with a rotary table too; or an arm of joints."""
-    if facts.is_arm:
+    if facts.joint:
         return _arm(facts)
     travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
     carriages, _, letter = facts.chain.partition("|")
@@ -59,8 +60,8 @@ def in_coordinates(points: Points, where: str) -> Points:
 
 def _arm(facts: MachineFacts) -> Arm:
     joints, up = facts.joint, np.array(facts.arm.up, dtype=np.float64)
-    tool, revolute = np.array(facts.arm.tool_mm), np.array([joint.type == "revolute" for joint in joints], dtype=bool)
-    geometry: dict[str, Any] = {"rows": np.array([joint.row for joint in joints]).reshape(-1, 5), "tool_mm": tool}
+    tool, revolute = np.array(facts.arm.tool_mm), np.array([joint.type == "revolute" for joint in joints])
+    geometry: dict[str, Any] = {"rows": np.array([joint.row for joint in joints]), "tool_mm": tool}
     if facts.arm.home:
         home = np.vstack([np.array(facts.arm.home)[:3], [0.0, 0.0, 0.0, 1.0]])
         home[:3, :3] = nearest_rotations(home[None, :3, :3])[0]
@@ -69,21 +70,19 @@ def _arm(facts: MachineFacts) -> Arm:
         geometry["tool_mm"] = geometry["tool_mm"] + tool
     return Arm(
         facts.name,
-        origin_mm=np.array(facts.origin_mm),
-        reach_mm=facts.arm.reach_mm or np.nan,
         **geometry,
         by_screws=bool(facts.arm.home),
         modified=facts.arm.convention == "modified",
         revolute=revolute,
         sense=np.array([-1.0 if joint.reversed else 1.0 for joint in joints]),
         up=up / np.linalg.norm(up),
-        limits=np.array([joint.travel or [np.nan, np.nan] for joint in joints]).reshape(-1, 2),
+        limits=np.array([joint.travel or [np.nan, np.nan] for joint in joints]),
     )
 
 
 def required_columns(machine: Machine, header: Collection[str]) -> Sequence[str]:
     """Columns that a recording must have; coordinates of an arm follow from what its joints read, and may be left out."""
-    if not isinstance(machine, Arm) or not machine.joints:
+    if not isinstance(machine, Arm):
         return REQUIRED
     recorded = COORDINATES if any(name in header for name in COORDINATES) else ()
     return (*(name for name in REQUIRED if name not in COORDINATES), *recorded, *machine.columns_of_joints)
@@ -91,7 +90,7 @@ def required_columns(machine: Machine, header: Collection[str]) -> Sequence[str]
 
 def coordinates(machine: Machine, table: Mapping[str, Floats], lines: Sequence[int], name: str) -> Floats:
     """Coordinates (n, 3), mm, of a recording: as recorded, or by the joints of an arm."""
-    if isinstance(machine, Arm) and machine.joints:
+    if isinstance(machine, Arm):
         return by_joints(machine, table, lines, name)
     return np.column_stack([table[column] for column in COORDINATES])
 
@@ -133,3 +132,30 @@ def _step(values: Floats) -> float:
     """The last decimal that numbers are printed with."""
     decimals = (d for d in range(_FINEST) if np.allclose(values, np.round(values, d), rtol=0, atol=10.0 ** (-d - 4)))
     return 10.0 ** -next(decimals, _FINEST)
+
+
+def strange_column(machine: Machine, column: str, header: Collection[str]) -> tuple[str, str] | None:
+    """What is wrong with a column that reads as one of an axis, and is none that the machine has; and what to do."""
+    found = _OF_AXIS.fullmatch(column)
+    arm = isinstance(machine, Arm)
+    own = (
+        machine.columns_of_joints
+        if isinstance(machine, Arm)
+        else [f"{one}_deg" for one in machine.axes if one not in AXES]
+    )
+    if found is None or column in own:
+        return None
+    same = next((name for name in own if name.startswith(f"{found[1]}_")), None)
+    if same is not None and same not in header:
+        unit = "degrees" if same.endswith("deg") else "mm"
+        return f"the column {column!r} is of the axis that reads {same!r}", f"Give it in {unit} as {same}"
+    if arm and column[0] == "q" and same is None:
+        count = len(own)
+        return (
+            f"the column {column!r} is of joint {found[1][1:]}, and the arm has {count}",
+            "Give its [[machine.joint]], or leave it out",
+        )
+    return None
+
+
+_OF_AXIS = re.compile(r"([abc]|q[1-9]\d?)(?:_(?:deg|rad|mrad|mm|m|angle))?", re.IGNORECASE)

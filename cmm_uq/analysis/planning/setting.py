@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -286,6 +287,9 @@ class Planning:
     # further set-ups, at which a plan says how well it predicts
     held_out: Callable[[Setting], tuple[SetUp, ...]] | None = None
     notes: Callable[[Setting], tuple[Text, ...]] | None = None  # what of set-ups is not looked at
+    pictures: Callable[[Setting, Sequence[SetUp]], Sequence[Any]] | None = (
+        None  # plots of them, in place of the usual ones
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -226,9 +226,9 @@ def plan_document(plan: MeasurementPlan) -> Document:
         warnings.append(say("Not determined by these set-ups: {free}.", free=free))
     marks = ((Verbatim("✓" if each.met else "✗"), each.what) for each in plan.conditions)
     conditions = (Paragraph(say("{mark} {what}", mark=mark, what=what)) for mark, what in marks)
-    pictures = (
-        () if plan.setting.planning.numbered else placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first)
-    )
+    setting, own = plan.setting, plan.setting.planning.pictures
+    box = setting.volume.box
+    pictures = own(setting, plan.to_measure) if own else placing_pictures(plan.to_measure, box, plan.first)
     return working_page(
         facts, say("Measurement plan"), artefact,
         particulars=(

@@ -21,7 +21,7 @@ from cmm_uq.app.desk.place import ChangedError, Draft, below, jobs_in, plans_in,
 from cmm_uq.app.desk.workers import ReportRun, shown_file
 from cmm_uq.app.serve.accounts import Accounts, Guard
 from cmm_uq.app.serve.application import POLICY, Answer, routed
-from cmm_uq.app.serve.exchange import DESK, RefusedRequest, WebRequest, WebResponse, read_form, to
+from cmm_uq.app.serve.exchange import DESK, RECORDED, RefusedRequest, WebRequest, WebResponse, read_form, to
 from cmm_uq.app.serve.page import WebPage, page
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
@@ -119,6 +119,7 @@ class Desk(DeskFolder):
             jobs.VERIFY: lambda request: page("desk/verify.html", DESK, name="", found=None),
             jobs.EVENTS: self.events,
             jobs.FIELD: self.field,
+            jobs.MACHINE: self.machine,
         }
 
     def _forms(self) -> Mapping[str, Callable[[WebRequest], Answer]]:
@@ -244,6 +245,12 @@ class Desk(DeskFolder):
         name = self.job_of(request.text("name"))
         content = content_of(self.root / name / "job.toml", JOB_BYTES, "")
         return self._job(name, content.decode("utf-8", "replace"), sha256(content))
+
+    def machine(self, request: WebRequest) -> WebResponse:
+        """Its picture, as the job describes it."""
+        request.only(("name",))
+        svg = self.reader.ask("machine", job=self.job_of(request.text("name")))
+        return WebResponse(svg.encode(), "image/svg+xml", policy=RECORDED)
 
     def _job(self, name: str, text: str, seen: str, difference: str | None = None, draft: str | None = None) -> WebPage:
         check = self.reader.ask("check", job=name, text=draft)

@@ -130,7 +130,7 @@ def difference(theirs: bytes, mine: bytes) -> str:
 JOB, RUN, CANCEL, CERTIFICATE, FILE = (f"{DESK}/{name}" for name in ("job", "run", "cancel", "certificate", "file"))
 PART, POINTS, CERTIFIED = (f"{DESK}/{name}" for name in ("part", "points", "certified"))
 DELETE, EVENTS = f"{DESK}/delete", f"{DESK}/events"
-PLAN, VERIFY = f"{DESK}/plan", f"{DESK}/verify"
+PLAN, VERIFY, MACHINE = f"{DESK}/plan", f"{DESK}/verify", f"{DESK}/machine"
 FIELD, FACTS = f"{DESK}/field.json", f"{DESK}/facts"
 RESULTS, REPORTS = "results.json", "reports"
 MOST_FILES, LISTED = 100, 200

@@ -27,12 +27,14 @@ from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.jobs.new import check_empty, job_id, put_new
 from cmm_uq.app.commands.parts.new import PART, Answers, certificate_files, part_of_drawing
 from cmm_uq.app.commands.parts.part import PartOptions, write_part
+from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.app.desk import exports, questions
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of, value_of
 from cmm_uq.base.output import Owner
 from cmm_uq.base.output.interruption import done, watch
+from cmm_uq.certificate.plots.machine import machine_plot
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.verify.given import CHECKS
 from cmm_uq.jobs.reading import is_part
@@ -133,6 +135,11 @@ def verification(path: str) -> dict[str, Any]:
     }
 
 
+def machine(job: str) -> str:
+    """The picture of a job's machine, as SVG."""
+    return machine_plot(read_job(Path(job), recorded=False).points.machine).svg
+
+
 DOES: Mapping[str, Callable[..., Any]] = {
     "first_keys": exports.first_keys,
     "read": exports.read,
@@ -148,6 +155,7 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "with_facts": questions.with_facts,
     "with_file": questions.with_file,
     "report": report,
+    "machine": machine,
     "verification": verification,
     "ready": lambda: True,
 }

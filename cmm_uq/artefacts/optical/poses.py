@@ -7,6 +7,7 @@ Jacobian).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +22,9 @@ from cmm_uq.base.arm import Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, in_a_row, say, signed
 from cmm_uq.base.points import AXES, Floats, Points, reading_name
+from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots.machine import poses_plot
+from cmm_uq.certificate.plots.volume import placing_pictures
 from cmm_uq.jobs.tables.plan import PosesFacts
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.geometry.feature import nearest_rotations
@@ -210,6 +214,19 @@ def _shaded(facts: PosesFacts, links: tuple[Floats, Floats], tool: Floats, towar
     return np.asarray(np.any(between & (off < facts.clearance_mm), axis=1))
 
 
+def pictures(setting: Setting, placings: Sequence[SetUp]) -> list[Plot]:
+    """Of an arm all poses together, of other machines their points in the volume."""
+    machine, facts = setting.machine, setting.plan.poses
+    if not placings:
+        return []
+    points = setting.joined(placings)
+    if not isinstance(machine, Arm):
+        return placing_pictures([SetUp(say("All points"), points)], setting.volume.box, 1)
+    walls = [np.array([one.low_mm, one.high_mm]) for one in facts.obstacle]
+    station = None if facts.station_mm is None else np.array(facts.station_mm)
+    return [poses_plot(machine.posed(points.columns).path, walls, station, facts.floor_mm)]
+
+
 def notes(setting: Setting) -> tuple[Text, ...]:
     facts = setting.plan.poses
     stated = {"floor_mm": facts.floor_mm, "obstacle": facts.obstacle or None, "station_mm": facts.station_mm}
@@ -227,4 +244,5 @@ PLANNING = Planning(
     numbered=numbered,
     held_out=lambda setting: even(setting, HELD_OUT, 4),
     notes=notes,
+    pictures=pictures,
 )

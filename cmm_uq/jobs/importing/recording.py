@@ -54,7 +54,7 @@ from cmm_uq.jobs.importing.header import (
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, axis_runs, placed, placed_runs
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
-from cmm_uq.jobs.machines import coordinates, required_columns
+from cmm_uq.jobs.machines import coordinates, required_columns, strange_column
 
 # lengths between which nx, ny, nz are taken for a direction: rounded to three digits, or scaled
 SHORTEST_NORMAL, LONGEST_NORMAL = 1e-3, 1e3
@@ -78,7 +78,7 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
         raise CmmUqError("has no rows", where=name, fix="The first line names the columns, then one row a point")
     rows, lines = list(compress(cells.rows, whole)), list(compress(cells.lines, whole))
     with wrong.going_on():
-        _check_header(header, name, needed := required_columns(machine, header))
+        _check_header(header, name, needed := required_columns(machine, header), machine)
     if not set(needed) <= set(header):
         wrong.refuse()  # the cells of another table are another's
     for i, column in enumerate(header):
@@ -135,7 +135,7 @@ def points_of(
     return Points(xyz, measurement, point, repeat, machine, columns, np.array(lines, dtype=np.int64))
 
 
-def _check_header(header: Sequence[str], name: str, needed: Sequence[str]) -> None:
+def _check_header(header: Sequence[str], name: str, needed: Sequence[str], machine: Machine) -> None:
     where = f"{name} line 1"
     if len(header) == 1 and ";" in header[0]:
         raise CmmUqError("cells are separated by semicolons", where=where,
@@ -148,12 +148,16 @@ def _check_header(header: Sequence[str], name: str, needed: Sequence[str]) -> No
             wrong.tell(f"the column {column!r} is there twice", where=where, fix="Keep one")
         elif problem := column_problem(column):
             wrong.tell(problem, where=where, fix="Name it with letters, digits and _")
-        elif wrong_name := misnamed(column, header):
+        elif wrong_name := misnamed(column, header) or strange_column(machine, column, header):
             wrong.tell(wrong_name[0], where=where, fix=wrong_name[1])
     for column in needed:
-        if column not in header:
+        if column not in header and not any(
+            strange_column(machine, one, header) for one in header if one[:2] == column[:2]
+        ):
             unread = " (of an axis that nobody reads, give one number in all rows)" * (column in COORDINATES)
-            wrong.tell(f"no column {column!r}", where=where, fix=f"{suggestion(column, header)}{unread}")
+            wrong.tell(
+                f"no column {column!r}", where=where, fix=f"{suggestion(column, set(header) - set(needed))}{unread}"
+            )
     wrong.refuse()
 
 

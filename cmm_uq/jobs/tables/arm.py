@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from cmm_uq.base.files.table import JobTable, Length, Position, Range, Triple, key
+from cmm_uq.base.files.table import JobTable, Position, Range, Triple, key
 from cmm_uq.base.points import Floats
 
 MOST_JOINTS = 12
@@ -42,6 +42,7 @@ class JointFacts(JobTable):
 
     def problems(self) -> Iterator[str]:
         stated = self.model_fields_set
+        yield from map("{} is a number of right angles in radians: give degrees".format, self._in_radians())
         if wrong := sorted(stated & _OF_ROWS) if self.direction is not None else sorted(stated & {"point_mm", "v_mm"}):
             other = "a row" if self.direction is not None else "a screw axis, whose direction is missing"
             yield f"{wrong[0]} is of {other}: give a row (a_mm, alpha_deg, d_mm, theta_deg), or direction with point_mm"
@@ -52,6 +53,15 @@ class JointFacts(JobTable):
             yield f"a {self.type} joint has {len(places)} of point_mm and v_mm: give one of a revolute joint, else none"
         elif self.v_mm is not None and abs(np.dot(self.unit, self.v_mm)) > PITCH * np.linalg.norm(self.v_mm):
             yield f"v_mm = {self.v_mm} has a part along the direction, as a thread has: give v = −ω × point, or point_mm"
+
+    def _in_radians(self) -> Iterator[str]:
+        angles = {name: [getattr(self, name)] for name in ("alpha_deg", "theta_deg", "beta_deg")}
+        if self.type == "revolute" and self.travel is not None:
+            angles["travel"] = list(self.travel)
+        for name, values in angles.items():
+            count = np.round(np.array(values) / RIGHT)
+            if np.any(count) and np.all(np.abs(values - count * RIGHT) < RADIAN_DIGITS) and np.abs(count).max() <= 4:
+                yield f"{name} = {values[0] if len(values) == 1 else values}"
 
     @property
     def unit(self) -> Floats:
@@ -74,6 +84,7 @@ class JointFacts(JobTable):
 
 
 _OF_ROWS = {"a_mm", "alpha_deg", "d_mm", "theta_deg", "beta_deg"}
+RIGHT, RADIAN_DIGITS = np.pi / 2, 3e-4  # a right angle in radians, and how far figures printed with four digits are off
 PITCH = 1e-6  # part of v along the direction from which on it is a screw that moves along as it turns
 _SQUARE = 1e-4  # by which figures of a rotation may be off, as they are printed
 _FrameRow = Annotated[list[Position], Field(min_length=4, max_length=4)]
@@ -91,9 +102,6 @@ class ArmFacts(JobTable):
     """Of an arm by screw axes the last frame where all joints read 0: three rows of a rotation with x, y and z in mm."""
     up: Triple = [0.0, 0.0, 1.0]
     """The direction against gravity in the frame of the base, for how joints sag: an arm on the ceiling has [0, 0, -1]."""
-    reach_mm: Length | None = None
-    """From the base to the farthest place that it measures, half of the measuring range; without `[[machine.joint]]` the
-    recording has coordinates alone, and `origin_mm` says where its origin lies from the base."""
 
     def problems(self) -> Iterator[str]:
         if not any(self.up):

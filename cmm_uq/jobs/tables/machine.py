@@ -304,10 +304,8 @@ class MachineFacts(JobTable):
         check_carriages(self.chain)
         if self.table.model_fields_set and "|" not in self.chain:
             yield f"[machine.table] is of a rotary table, which chain = {self.chain!r} has not: give it behind a bar, as XYZ|C"
-        own = _OF_ARMS if self.joint else _OF_ARMS | {"origin_mm"}
-        if self.is_arm and (wrong := sorted(self.model_fields_set - own)):
-            an_arm = "[[machine.joint]]" if self.joint else "[machine.arm]"
-            yield f"{wrong[0]} is of a machine of carriages, and {an_arm} of an arm: leave one of them out"
+        if self.joint and (wrong := sorted(self.model_fields_set - _OF_ARMS)):
+            yield f"{wrong[0]} is of a machine of carriages, and [[machine.joint]] of an arm: leave one of them out"
         screws = [number for number, joint in enumerate(self.joint, 1) if joint.direction is not None]
         if screws and len(screws) < len(self.joint):
             other = next(i for i in range(1, len(self.joint) + 1) if i not in screws)
@@ -318,12 +316,15 @@ class MachineFacts(JobTable):
             yield "[machine.arm] home is of screw axes, and joints are rows: leave it out, or give direction and point_mm"
         if screws and "convention" in self.arm.model_fields_set:
             yield "[machine.arm] convention is of rows, and joints are screw axes: leave it out"
-        if not self.joint and self.arm.model_fields_set - ({"reach_mm", "up"} if self.is_arm else set()):
-            yield "[machine.arm] is of an arm: give its rows, [[machine.joint]], or of one whose joints are not read reach_mm"
-
-    @property
-    def is_arm(self) -> bool:
-        return bool(self.joint or self.arm.reach_mm)
+        if (
+            self.joint
+            and not screws
+            and not any((one.a_mm, one.d_mm) != (0, 0) for one in self.joint)
+            and not any(self.arm.tool_mm)
+        ):
+            yield "no [[machine.joint]] has a length, and the tool is on the last: give a_mm and d_mm of its rows"
+        if self.arm.model_fields_set and not self.joint:
+            yield "[machine.arm] is of an arm: give its rows, [[machine.joint]]"
 
 
 _OF_ARMS = frozenset(("name", "manufacturer", "model", "serial", "owner", "joint", "arm", "calibrate"))

@@ -160,6 +160,15 @@ def test_two_tabs_do_not_write_over_each_other(worked: Visitor) -> None:
     assert path.read_bytes() == original
 
 
+def test_the_machine_of_a_job_is_shown(worked: Visitor) -> None:
+    page = worked.get("/desk/job?name=K-1")
+    assert '<img src="/desk/machine?name=K-1"' in page.text
+    picture = worked.get("/desk/machine?name=K-1")
+    assert picture.text.startswith("<svg")
+    assert "Carriage X" in picture.text
+    assert worked.get("/desk/machine?name=K-9").status == 409
+
+
 def test_an_editor_is_not_written_over(worked: Visitor) -> None:
     path = worked.desk.root / "K-1" / "job.toml"
     original = path.read_bytes()
