@@ -108,6 +108,8 @@ def _turns(values: Sequence[str], targets: Sequence[float]) -> list[int] | None:
 
 def counted(label: Label, *, lengths: bool) -> str | None:
     """What a label counts, by the words above it, else by those in it."""
+    if label.sort == "column" and counting(label.values) and hint(label.values[0], lengths=lengths) == RUN:
+        return RUN  # below the head of what stands beside, as of directions
     if label.sort == "column" and (of := hint(label.words, lengths=lengths)) and (of != RUN or counting(label.values)):
         return of
     if label.sort == "title" and not label.words:

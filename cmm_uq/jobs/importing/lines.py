@@ -25,6 +25,7 @@ from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
 from cmm_uq.jobs.importing.factors import (
+    LINE,
     RUN,
     codes,
     counted,
@@ -312,7 +313,8 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
         for find in (axis_in, _letter_in)
         for label in labels
     ]
-    axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
+    lines = [label.values for label in labels if counted(label, lengths=True) == LINE and len({*label.values}) > 1]
+    axes = next((own for own in named if all(own)), None) or [*(lines or [[_axis_of(sheets)] * len(target)])[0]]
     ways = senses(labels, target.tolist())
     parts = [part for label in labels for part in (label, *parts_of(label))]
     run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)

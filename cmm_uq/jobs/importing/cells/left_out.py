@@ -34,7 +34,9 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
     """Whether a cell of a row says that it is no measured point or length."""
     known = frozenset().union(*(words_of("rows")[table] for table in tables))
     texts = (cell for cell in row if isinstance(cell, str) and not (len(cell) == 1 and cell.isascii()))  # as O, for oui
-    return any(" ".join(plain_words(text)) in known for text in texts)
+    words = [*map(plain_words, texts)]
+    void = words_of("rows")["void"] - words_of("lengths")["run"] if "void" in tables else frozenset[str]()
+    return any(" ".join(own) in known or (len(own) > 1 and own[0] in void) for own in words)  # as ``VOID - air alarm``
 
 
 def of_feature(grid: CutSheet, row: int) -> bool:

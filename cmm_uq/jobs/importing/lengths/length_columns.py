@@ -33,6 +33,7 @@ _FAR = 1.0  # mm by which no measured length differs from its reference, where b
 _LEAST = 2.0  # of a length without a reference, in the unit of the file
 WIDEST = 100  # columns of a table of lengths
 _WITHIN = re.compile(r"(?<![\d.,])\d+[.,]\d+(?![\d.,]*\d)")  # figures in texts
+_AXIS = re.compile(r"(?<![A-Za-z])[XYZ](?![A-Za-z])")
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
 _NAME = "Name the columns by what they are: nominal_mm, reference_mm, length_mm, deviation_um"
@@ -231,7 +232,7 @@ def side_by_side(columns: Sequence[FigureColumn]) -> bool:
     What else stands in a head must be the same for each of those.
     """
     levels = [*zip(*(c.path for c in columns), strict=True)]
-    counting = [len({*map(numberless, texts)}) == 1 and _from_one(texts) for texts in levels]
+    counting = [len({_AXIS.sub("0", numberless(text)) for text in texts}) == 1 and _from_one(texts) for texts in levels]
     called = [all(hint(text, lengths=True) in ("line", "run") for text in texts) for texts in levels]
     known = [own for own, *known in zip(levels, counting, called, strict=True) if any(known)]
     each = [*zip(*known, strict=True)] if known else [()] * len(columns)
