@@ -29,6 +29,7 @@ from cmm_uq.jobs.importing.factors import (
     RUN,
     codes,
     counted,
+    fixes,
     in_turn,
     numbered_runs,
     parts_of,
@@ -313,8 +314,12 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
         for find in (axis_in, _letter_in)
         for label in labels
     ]
-    lines = [label.values for label in labels if counted(label, lengths=True) == LINE and len({*label.values}) > 1]
-    axes = next((own for own in named if all(own)), None) or [*(lines or [[_axis_of(sheets)] * len(target)])[0]]
+    axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
+    at = codes(target.tolist())
+    lines = (
+        label.values for label in labels if counted(label, lengths=True) == LINE and not fixes(at, codes(label.values))
+    )
+    axes = [*next(lines, axes)] if {*axes} == {"1"} else axes  # as diagonals
     ways = senses(labels, target.tolist())
     parts = [part for label in labels for part in (label, *parts_of(label))]
     run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)

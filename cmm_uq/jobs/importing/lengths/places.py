@@ -249,6 +249,18 @@ def full_place(point: Point, *others: Point) -> Floats | None:
     return np.array([own[axis] for axis in "XYZ"]) if len(own) == 3 else None
 
 
+def _ends_of(one: Said, least: float) -> tuple[Point, Point, Point]:
+    """Start and end, of places that no word calls either too, and the direction to a place that is nearer than ``least``."""
+    start, end = one.start, one.end or one.towards
+    if len(one.loose) == 2 and not start and not end:
+        start, end = one.loose
+    elif len(one.loose) == 1 and bool(start) != bool(end):
+        start, end = (start, one.loose[0]) if start else (one.loose[0], end)
+    way = {axis: one.towards[axis] - value for axis, value in start.items() if axis in one.towards}
+    near = len(way) == len("XYZ") and np.linalg.norm([*way.values()]) < least
+    return start, {} if near else end, way if near else {}
+
+
 def place_of_line(
     said: Sequence[Said], longest: float, near: float, others: Sequence[Floats] = (), *, alone: bool = False
 ) -> str:
@@ -262,16 +274,11 @@ def place_of_line(
     axis = letters.pop() if len(letters) == 1 else ""
     whole, starts, ends, said_so = Said(), list[Floats](), list[Floats](), True
     for one in said:
-        start, end = one.start, one.end
-        if len(one.loose) == 2 and not start and not end:
-            (start, end), said_so = one.loose, False
-        elif len(one.loose) == 1 and bool(start) != bool(end or one.towards):
-            start, end = (start, one.loose[0]) if start else (one.loose[0], end)
-        else:
-            whole.odd |= bool(one.loose)
-        whole.odd |= one.odd
-        if len(one.towards) == len(start) == 3:
-            whole.take(whole.way, {axis: one.towards[axis] - start[axis] for axis in start})
+        start, end, way = _ends_of(one, longest * (1 - _ROUNDED) - near)
+        said_so &= not (len(one.loose) == 2 and not one.start and not one.end)
+        count = len(one.loose) + bool(one.start) + bool(one.end or one.towards)
+        whole.odd |= one.odd or (bool(one.loose) and count != 2)
+        whole.take(whole.way, way)
         each = ((whole.across, one.across), (whole.way, one.way), (whole.start, start), (whole.centre, one.centre))
         for into, values in each:
             whole.take(into, values)
