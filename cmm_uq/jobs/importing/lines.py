@@ -25,11 +25,9 @@ from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
 from cmm_uq.jobs.importing.factors import (
-    LINE,
     RUN,
     codes,
     counted,
-    fixes,
     in_turn,
     numbered_runs,
     parts_of,
@@ -315,11 +313,6 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
         for label in labels
     ]
     axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
-    at = codes(target.tolist())
-    lines = (
-        label.values for label in labels if counted(label, lengths=True) == LINE and not fixes(at, codes(label.values))
-    )
-    axes = [*next(lines, axes)] if {*axes} == {"1"} else axes  # as diagonals
     ways = senses(labels, target.tolist())
     parts = [part for label in labels for part in (label, *parts_of(label))]
     run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
