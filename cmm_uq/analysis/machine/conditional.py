@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.machine import recordings
-from cmm_uq.analysis.machine.state import MachineState, StatedNoise, StatementEvidence, Unmodelled
+from cmm_uq.analysis.machine.state import GivenSizes, MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.machine.model.field import AtPoints, GivenPeriod, covariance, family_of, linear
@@ -85,10 +85,15 @@ class RecordedField:
         return cls(whole, modelled, which, tuple(effects), np.concatenate(sds))
 
     def coefficients(
-        self, sizes: Sizes, scales: Floats, random: np.random.Generator, within: Floats | None = None
+        self,
+        sizes: Sizes,
+        scales: Floats,
+        random: np.random.Generator,
+        within: Floats | None = None,
+        observed: Floats | None = None,
     ) -> Floats:
         """Exact draws (N, k + f) of the calibration's effects, then of what it left out, for N sizes of noise and families."""
-        drawn, start = self.field.draw(sizes, scales, random, within), len(self.field.linear.unknowns)
+        drawn, start = self.field.draw(sizes, scales, random, within, observed), len(self.field.linear.unknowns)
         others = drawn[:, start : start + len(self.sd)]
         others *= self.sd
         return np.hstack([drawn[:, : self.modelled], others])
@@ -208,9 +213,11 @@ def given_recording(
         noise = stated_noise(model, whole.field.noise, sizes.noise)
     drawn, k = whole.coefficients(sizes.noise, sizes.families, random, sizes.within), whole.modelled
     drawn[:, :k] = doubted_draws(doubt, len(model.unknowns), np.arange(k), seed, drawn[:, :k])
-    together = _with(state, model, whole, drawn, noise)
+    together = with_errors(state, model, whole, drawn, noise)
     scales = dict(zip(whole.field.families, sizes.families.T, strict=True))
-    return replace(together, scales=scales, prior_share=_shares(together), family_share=_shares(together, scales))
+    shares = _shares(together), _shares(together, scales)
+    given = GivenSizes(state, sizes)
+    return replace(together, scales=scales, prior_share=shares[0], family_share=shares[1], given=given)
 
 
 def _sizes(
@@ -238,7 +245,7 @@ def doubted_draws(doubt: Doubt, count: int, named: Ints, seed: int, draws: Float
     return doubt.widened(whole, seed)[:, named]
 
 
-def _with(
+def with_errors(
     state: MachineState, model: RecordingModel, whole: RecordedField, drawn: Floats, noise: StatedNoise
 ) -> MachineState:
     """The state with draws (N, k + f) of all errors together."""

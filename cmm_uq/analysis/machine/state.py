@@ -27,6 +27,7 @@ from cmm_uq.machine.model.field import ALLOWED, PERIODIC, PLAY, bounded, curves,
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
 from cmm_uq.machine.physics.effects.rotary import OfTable
+from cmm_uq.maths.inference.family_sizes import FieldSizes
 
 POWER_QUANTILE = 1.6449  # of a normal error one in ten, in size, is larger than so many standard deviations
 # mechanisms that are no error of the machine on its own; those of the stylus are drawn from its qualification
@@ -121,6 +122,14 @@ class StatedNoise:
 
 
 @dataclass(frozen=True, eq=False)
+class GivenSizes:
+    """What a machine's draws given its recordings follow from, in their order."""
+
+    before: MachineState  # as its certificate states it, with what its recordings allow of what is stated
+    sizes: FieldSizes
+
+
+@dataclass(frozen=True, eq=False)
 class MachineState:
     machine: Machine  # its chain, travel and origin
     effects: tuple[Effect, ...]  # that the calibration modelled, in the order of their coefficients
@@ -149,6 +158,7 @@ class MachineState:
     temperature_c: float | None = None
     measured: date | None = None  # day of the part's measurement
     drift_unknown: tuple[str, ...] = ()  # effects of which nobody knows how they have changed since the calibration
+    given: GivenSizes | None = None  # its recordings' part in its draws; ``None`` where these are not at hand
 
     def __post_init__(self) -> None:
         k = sum(len(effect.coefficients) for effect in self.effects)

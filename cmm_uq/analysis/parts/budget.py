@@ -199,8 +199,10 @@ def _within(causes: Sequence[PartCause], drawn: Sequence[Sequence[Drawn]], y: Fl
     for cause, blocks in zip(causes, drawn, strict=True):
         for factor in dict.fromkeys(cause.factors):
             columns = np.flatnonzero([name == factor for name in cause.factors])
-            each = [one.of(columns) if isinstance(one, Rows) else one[:, columns] for one in blocks]
-            own = np.asfortranarray(np.concatenate(each))
+            own, end = np.empty((len(y), len(columns)), order="F"), 0
+            for one in blocks:
+                rows, end = slice(end, end + len(one)), end + len(one)
+                own[rows] = one.of(columns) if isinstance(one, Rows) else one[:, columns]
             own -= own.mean(axis=0)
             explained = own @ np.linalg.lstsq(own, centred, rcond=None)[0]
             chance = own.shape[1] / len(own)  # what as many columns explain of anything

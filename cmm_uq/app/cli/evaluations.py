@@ -125,13 +125,16 @@ def plan(
         True, "Predict how large an effect must be for the diagnosis to find it; takes most of the time."
     ),
     seed: int = option(0, "Seed of the recordings drawn for that.", "N", min=0),
+    for_part: Path | None = option(None, "Part's job: what the plan does to its uncertainty.", "PART", "none"),
     end: Ending = opt.ending(DOCUMENTS),
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with end.progress() as stage:
         from cmm_uq.app.commands.plan import write_plan
 
-        written = write_plan(job, out, power=power, seed=seed, force=end.force, stage=stage, language=end.language)
+        written = write_plan(
+            job, out, power=power, seed=seed, force=end.force, stage=stage, language=end.language, for_part=for_part
+        )
     conclude(written, end)
 
 

@@ -2,29 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cmm_uq.analysis.diagnosis.held_out import with_quantities
+from cmm_uq.analysis.machine.recordings import FurtherRecording, doubted, mean_noise, model_of_machine
+from cmm_uq.analysis.parts.foreseen import foreseen_measurement
 from cmm_uq.analysis.planning.set_up import join
+from cmm_uq.analysis.planning.setting import white_noise
 from cmm_uq.app.commands import plan_page as words
+from cmm_uq.app.commands.certificates.further import MOST_FURTHER
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
 from cmm_uq.app.commands.jobs.simulate import to_fill_in
+from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.app.commands.planning import MeasurementPlan, Outlook, make_plan
 from cmm_uq.app.commands.reading import in_language, read_job
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.document import Standing
+from cmm_uq.certificate.part.budget_section import foreseen_words
+from cmm_uq.certificate.part.measurement import PartMeasurement, foreseen_data, in_unit, unit_of
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Figure, Headline, Summary
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.job import PartJob, read_part
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.physics.stated import with_own_physics
 
 TO_FILL_IN = "plan.csv"
@@ -33,9 +45,16 @@ PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 
 @naming_package()
 @with_own_physics
-def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
-    """Plan a job that was read, whose recording may be missing; nothing is written."""
+def plan_outcome(
+    job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent, for_part: PartJob | None = None
+) -> Outcome:
+    """Plan a job that was read, whose recording may be missing; nothing is written.
+
+    ``for_part``: on whose uncertainty it is told what the set-ups will do.
+    """
     plan = make_plan(job, power=power, seed=seed, progress=stage)
+    if for_part is not None:
+        plan = replace(plan, part=with_plan(for_part, plan, seed, stage))
     stage("Drawing the placings", 0.95)
     with lettered_in(job.facts.job.language):
         document = words.plan_document(plan)
@@ -46,9 +65,43 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     )  # fmt: skip
 
 
+def with_plan(job: PartJob, plan: MeasurementPlan, seed: int, stage: Stage = silent) -> PartMeasurement:
+    """A part, and what the set-ups of a plan that are still to be measured will do to its uncertainty."""
+    found, setting, where = evaluate_part(job, PartOptions(seed), stage), plan.setting, str(job.folder / "job.toml")
+    if found.recordings is None:
+        raise CmmUqError(
+            "the errors of its machine do not follow from recordings alone",
+            where=where,
+            fix="Give the machine's certificate as PDF, and leave out tests that it passed",
+        )
+    machine, own = setting.machine, found.given.machine.machine
+    if machine.chain != own.chain or not np.array_equal(machine.travel_mm, own.travel_mm, equal_nan=True):
+        raise CmmUqError(
+            "was measured on another machine than the plan's, by its chain and travel",
+            where=where,
+            fix="Plan a measurement of the machine that measured the part",
+        )
+    if not plan.to_measure or setting.observe is None:
+        raise CmmUqError(
+            "nothing is left to be measured whose effect on a part could be told",
+            where="job.toml [plan]",
+            fix="Plan set-ups; a recording that is there is a further certificate of the part's job",
+        )
+    first, beside = found.recordings
+    whole = model_of_machine(first, setting.model(setting.joined(plan.to_measure)))
+    model = with_quantities(whole, setting.observed, seed, MOST_FURTHER)
+    noise = setting.noise or white_noise(model)
+    factor = mean_noise(noise.components(model, np.array([one.prior_mean for one in model.unknowns])), noise.typical)
+    doubt = doubted(model, causes_of(model.artefact, plan.job.circumstances))
+    further = replace(beside, recordings=(*beside.recordings, FurtherRecording(model, np.hstack([factor, doubt]))))
+    name = say("the set-ups of this plan")
+    U = np.array([one.U for one in found.stated])
+    return replace(found, foreseen=(foreseen_measurement(name, found.virtual, found.given, first, further, U, seed),))
+
+
 def write_plan(
     job: Path, out: Path | None = None, *, power: bool = True, seed: int = 0, force: bool = False,
-    stage: Stage = silent, language: Code | None = None,
+    stage: Stage = silent, language: Code | None = None, for_part: Path | None = None,
 ) -> Written[Outcome]:  # fmt: skip
     """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
 
@@ -56,7 +109,8 @@ def write_plan(
     to measure.
     """
     read = in_language(read_job(job, recorded=False), language)
-    outcome = partial(plan_outcome, read, power=power, seed=seed, stage=stage)
+    of = None if for_part is None else read_part(for_part)
+    outcome = partial(plan_outcome, read, power=power, seed=seed, stage=stage, for_part=of)
     return PLAN.write(read, outcome, out, force=force, stage=stage)
 
 
@@ -87,8 +141,17 @@ def plan_results(plan: MeasurementPlan) -> dict[str, Any]:
              "middle_mm": placing.middle.tolist(), "points": len(placing.points)}
             for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
         ],
-        "minutes": sum(plan.minutes),
+        "minutes": sum(plan.minutes), **({} if plan.part is None else {"for_part": part_data(plan.part)}),
     }  # fmt: skip
+
+
+def part_data(found: PartMeasurement) -> dict[str, Any]:
+    """For results.json: U of each characteristic as it is, and as it will be."""
+    now = [
+        {"name": one.name, "unit": unit_of(one), "U": in_unit(one, stated.U)}
+        for one, stated in zip(found.characteristics, found.stated, strict=True)
+    ]
+    return {"job": found.job.facts.job.id, "characteristics": now, "foreseen": foreseen_data(found, found.foreseen)}
 
 
 def _outlook_data(outlook: Outlook) -> dict[str, Any]:
@@ -164,6 +227,8 @@ def plan_summary(plan: MeasurementPlan) -> Summary:
         remarks += [say("Could not be told apart: {effects}.", effects=text) for text in words.pairs(found)]
         alike = words.absorbed(found)
         remarks += [say("Would be taken for what the job names: {effects}.", effects=text) for text in alike]
+    if plan.part is not None:
+        remarks += foreseen_words(plan.part)
     return Summary(
         words.to_measure_words(plan), verdicts=met, figures=figures, remarks=tuple(remarks),
         details=(heads, *placings) if placings else (),

@@ -25,6 +25,7 @@ from cmm_uq.certificate.document import (
     working_page,
 )
 from cmm_uq.certificate.origin import program
+from cmm_uq.certificate.part.budget_section import foreseen_section
 from cmm_uq.certificate.plots.volume import gain_plot, placing_pictures
 from cmm_uq.certificate.wording import effect_title, stated_physics
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -249,6 +250,7 @@ def plan_document(plan: MeasurementPlan) -> Document:
             section(say("What a better plan gains"), *_gain(plan)),
             section(say("Smallest effects that the diagnosis would find"), _smallest(plan)),
             section(say("Conditions of the standard"), *conditions),
+            *([] if plan.part is None else [foreseen_section(plan.part)]),
         ),
         attachments=(*((Verbatim("plan.csv"),) if plan.to_measure else ()), Verbatim("results.json")),
         produced_by=program(plan.job), end=say("End of plan"),

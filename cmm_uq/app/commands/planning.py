@@ -24,6 +24,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.effect import Effect
 
@@ -125,6 +126,7 @@ class MeasurementPlan:
     conditions : of the standards, by all that will have been measured.
     worth : repeats against placings; ``None`` where nothing is to be measured, or a recording is there.
     free : of a kind that names no effects, what no reading shows, in words.
+    part : the part that they are for, with what they will do to its uncertainty; ``None`` where none is named.
     """
 
     job: Job
@@ -137,6 +139,7 @@ class MeasurementPlan:
     conditions: tuple[Condition, ...]
     free: tuple[Text, ...] = ()
     worth: design.RepeatsComparison | None = None
+    part: PartMeasurement | None = None
 
     @property
     def outlook(self) -> Outlook:

@@ -8,6 +8,7 @@ import numpy as np
 
 from cmm_uq.analysis.parts.budget import FAMILIES, family_of, line_in_words
 from cmm_uq.analysis.parts.characteristics import never_negative
+from cmm_uq.analysis.parts.foreseen import ForeseenMeasurement, foretold
 from cmm_uq.base.messages import (
     DASH,
     NOTHING,
@@ -46,7 +47,7 @@ DETAILED = 10  # characteristics whose budgets are listed line by line: those of
 # lines of a budget that are listed at most, the share from which on, and that from which on a factor of one is
 _LINES, _LEAST, _FACTOR = 6, 0.01, 0.05
 _WAYS = 6  # characteristics for which every way is shown
-_GAIN = 0.02  # of u, below which a way is no gain
+_GAIN, _HELPS = 0.02, 0.1  # of u, below which a way is no gain; of U, below which a further measurement is none
 
 
 def line_words(line: str) -> Text:
@@ -147,10 +148,15 @@ def _factors(detailed: list[CharacteristicFigures]) -> Table | None:
             for i, f in enumerate(kept)
         ]
     heads = (Column(say("No.")), say("Characteristic"), say("Error"), Column(say("Share"), unit("%")))
-    return table(say("Errors that are known together, by name"), heads, rows, say(
-        "The calibration ties these errors together. Each share is what knowing this error alone would take away, with what "
-        "it tells of the others, so that together they may be more than 100 % or less."
-    ))  # fmt: skip
+    return table(
+        say("Errors that are known together, by name"),
+        heads,
+        rows,
+        say(
+            "The calibration ties these errors together. Each share is what knowing this error alone would take away, with "
+            "what it tells of the others, so that together they may be more than 100 % or less."
+        ),
+    )
 
 
 def unseen_section(found: PartMeasurement) -> Section:
@@ -217,7 +223,74 @@ def ways_section(found: PartMeasurement) -> Section:
         (zoned, say("u of form, orientation, location and runout is known to {known} %.", known=zones)),
         (len(shown) < len(found.stated), _chosen(shown)),
     )
-    return section(title, Paragraph(best_words(critical(found))), table(say("Ways to measure"), heads, rows, *notes))
+    planned = table(say("Ways to measure"), heads, rows, *notes)
+    return section(
+        title,
+        Paragraph(best_words(critical(found))),
+        planned,
+        *map(Paragraph, foreseen_words(found)),
+        foreseen_table(found),
+    )
+
+
+def foreseen_section(found: PartMeasurement) -> Section:
+    """What the set-ups of a plan do."""
+    title = say("What these set-ups do for the part {name}", name=Verbatim(found.job.facts.part.name))
+    return section(title, *map(Paragraph, foreseen_words(found)), foreseen_table(found))
+
+
+def foreseen_words(found: PartMeasurement) -> list[Text]:
+    """What a further measurement of the machine does to the characteristic that it helps most; none without any."""
+    for one in _foreseen_of(found):
+        for way in _helpful(one)[:1]:
+            now, then = one.small(one.expanded), one.small(float(way.U[1, one.place]))
+            return [
+                say(
+                    "To bring U of {name} from {now} to {then} {unit}: {measurement}.",
+                    name=one.called,
+                    now=now,
+                    then=then,
+                    unit=one.scale.small,
+                    measurement=way.name,
+                )
+            ]
+    none = say("No further measurement of the machine that was tried makes U smaller by more than a tenth.")
+    return [none] if found.foreseen else []
+
+
+def _foreseen_of(found: PartMeasurement) -> list[CharacteristicFigures]:
+    """What is too uncertain, or all where nothing is, of what is foretold; the least margin first."""
+    told, places = foretold(found.plan), found.too_uncertain or range(len(found.stated))
+    return [one for one in by_margin(found) if one.place in places and told[one.place]][:_WAYS]
+
+
+def _helpful(one: CharacteristicFigures) -> list[ForeseenMeasurement]:
+    some = [way for way in one.found.foreseen if way.U[1, one.place] < (1 - _HELPS) * one.expanded]
+    return sorted(some, key=lambda way: float(way.U[1, one.place]))
+
+
+def foreseen_table(found: PartMeasurement) -> Table | None:
+    """What further measurements of the machine do to U."""
+    rows = list[tuple[Text, ...]]()
+    for one in _foreseen_of(found):
+        for i, way in enumerate(_helpful(one)):
+            low, then, high = map(one.small, way.U[:, one.place].tolist())
+            own = (NOTHING, NOTHING, NOTHING) if i else (one.beside, one.small(one.expanded), one.scale.small)
+            rows.append((one.number, *own, way.name, then, say("{low} to {high}", low=low, high=high)))
+    heads = (
+        Column(say("No.")),
+        say("Characteristic"),
+        Column(say("U")),
+        say("Unit"),
+        say("Further measurement"),
+        Column(say("U then")),
+        Column(say("In eight of ten cases")),
+    )
+    return table(say("What further measurements of the machine would do"), heads, rows, say(
+        "U then follows from all recordings together, in the median of machines as this one may be by those that there are. "
+        "How large its errors are the further recording shows: where they are larger than they seem, U becomes no smaller. "
+        "U of form, orientation, location and runout goes by their value, and is not foretold."
+    ))  # fmt: skip
 
 
 def best_words(one: CharacteristicFigures) -> Text:

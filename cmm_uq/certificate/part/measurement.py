@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import degrees, isfinite
@@ -15,8 +15,10 @@ from cmm_uq import __version__
 from cmm_uq.analysis.conformity.decision import Outcome, rule_name, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
 from cmm_uq.analysis.machine.performance import PriorInfluence
+from cmm_uq.analysis.machine.recordings import FurtherRecordings
 from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares
 from cmm_uq.analysis.parts.characteristics import never_negative
+from cmm_uq.analysis.parts.foreseen import ForeseenMeasurement, foretold
 from cmm_uq.analysis.parts.methods import method as other_methods
 from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan
@@ -40,11 +42,13 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.values import Reported
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.verdicts import Verdicts, gravest
+from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.maths.uncertainty.propagation import Simulated
 
 # what states the machine: a certificate with its inputs inside, the figures and draws alone, or a job that was analysed
 Source = Literal["certificate", "results", "job"]
 MATTERS = 0.05  # share of a variance from which on what nobody saw is told by name
+TOO_LARGE = 0.1  # part of a tolerance from which on U is told how to be made smaller
 
 
 @dataclass(frozen=True)
@@ -147,6 +151,9 @@ class PartMeasurement:
     files: Mapping[str, bytes] = field(default_factory=dict)  # that come with the page, by name
     influence: tuple[PriorInfluence, ...] = ()  # what other priors of the machine's errors would change
     withheld: tuple[Text, ...] = ()  # why nothing is called conforming, whatever its value
+    # of the machine's calibration, and those beside it, where all of its errors follow from these
+    recordings: tuple[RecordingModel, FurtherRecordings] | None = None
+    foreseen: tuple[ForeseenMeasurement, ...] = ()  # what further measurements of the machine would do
 
     @property
     def characteristics(self) -> list[CharacteristicFacts]:
@@ -176,6 +183,17 @@ class PartMeasurement:
     def nearest(self) -> int | None:
         """Place of the characteristic with the least margin; ``None`` where nothing is decided."""
         return None if np.isnan(self.margins).all() else int(np.nanargmin(self.margins))
+
+    @cached_property
+    def too_uncertain(self) -> list[int]:
+        """Places of characteristics that are undecided, or of which U takes more than a tenth of the tolerance."""
+        found, every = [], self.plan.characteristics
+        for i, (one, judged, facts) in enumerate(zip(every, self.judged, self.characteristics, strict=True)):
+            low = 0.0 if facts.asks.limits == "zone" else one.lower
+            width = float("nan") if low is None or one.upper is None else one.upper - low
+            if judged is not None and (judged.outcome == "undecided" or TOO_LARGE * width < self.stated[i].U):
+                found.append(i)
+        return found
 
     @property
     def outcomes(self) -> list[Outcome]:
@@ -207,7 +225,7 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
     stated = [_characteristic(found, i) for i in range(len(names))]
     said = {one.of: one for one in found.given.machine.statements}
     read_by = readings_data(found.given.machine.machine, found.given.machine.statements)
-    factors = np.array([_in(one, 1.0) for one in found.characteristics])
+    factors = np.array([in_unit(one, 1.0) for one in found.characteristics])
     part = {"name": facts.part.name, "drawing": facts.part.drawing or None, "serial": facts.part.serial or None,
             "not_measured": list(facts.part.not_measured)}  # fmt: skip
     decision = {
@@ -261,8 +279,9 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
             "command": further.command or None, "file": further.file or None, "missed": list(further.missed),
         },
         "ways": [
-            {"way": _plain(way.name), "u": list(map(_in, found.characteristics, way.u.tolist()))} for way in found.ways
+            {"way": _plain(way.name), "u": list(map(in_unit, found.characteristics, way.u.tolist()))} for way in found.ways
         ],
+        **({"foreseen": foreseen_data(found, found.foreseen)} if found.foreseen else {}),
         "other_methods": methods_data(found.methods), **_reported(found.job.reported),
         "warnings": [_plain(text) for text in found.warnings],
     }  # fmt: skip
@@ -303,15 +322,15 @@ def _characteristic(found: PartMeasurement, i: int) -> dict[str, Any]:
     sided, known_as = bool(never_negative(found.plan)[i]), "stated" if found.job.reported else "median"
 
     def inside(value: float | None) -> float | None:
-        return None if value is None else _in(facts, value)
+        return None if value is None else in_unit(facts, value)
 
     return {
         "name": facts.name, "what": facts.what, "features": list(facts.features), "datums": list(facts.datums),
         "association": found.plan.characteristics[i].association, "unit": unit_of(facts),
-        "measured": None if found.measured is None else _in(facts, float(found.measured[i])),
-        "mean_error": _in(facts, stated.error), "value": inside(stated.value), "value_is": known_as if sided else "mean",
+        "measured": None if found.measured is None else in_unit(facts, float(found.measured[i])),
+        "mean_error": in_unit(facts, stated.error), "value": inside(stated.value), "value_is": known_as if sided else "mean",
         "stated_by": "interval" if stated.value is not None and sided else "U",
-        "u": _in(facts, stated.u), "U": _in(facts, stated.U), "k": stated.k if isfinite(stated.k) else None,
+        "u": in_unit(facts, stated.u), "U": in_unit(facts, stated.U), "k": stated.k if isfinite(stated.k) else None,
         "interval95": list(map(inside, stated.interval)), "worst_cause": found.budget.worst(facts.name),
         "limits": judged and {
             "lower": inside(judged.lower), "upper": inside(judged.upper),
@@ -324,7 +343,18 @@ def _characteristic(found: PartMeasurement, i: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _in(one: CharacteristicFacts, value: float) -> float:
+def foreseen_data(found: PartMeasurement, foreseen: Iterable[ForeseenMeasurement]) -> list[dict[str, Any]]:
+    told, names = np.flatnonzero(foretold(found.plan)).tolist(), ("U_low", "U", "U_high")
+
+    def figures(i: int, way: ForeseenMeasurement) -> dict[str, Any]:
+        one = found.characteristics[i]
+        each = (in_unit(one, U) for U in way.U[:, i].tolist())
+        return {"name": one.name, "unit": unit_of(one), **dict(zip(names, each, strict=True))}
+
+    return [{"measurement": _plain(way.name), "characteristics": [figures(i, way) for i in told]} for way in foreseen]
+
+
+def in_unit(one: CharacteristicFacts, value: float) -> float:
     return degrees(value) if one.asks.limits == "angles" else value
 
 

@@ -43,6 +43,13 @@ _NUMBERS = 2_000_000  # in the matrices that are factorised at once
 _CLASSES = 60  # of observations alike in their noise; of more, a matrix a component of the noise is less work
 
 
+def _log_normal(covariance: Floats, values: Floats) -> Floats:
+    """(N,) logarithms of the density of values (n, N), up to a constant."""
+    factor = scipy.linalg.cholesky(covariance, lower=True)
+    white = scipy.linalg.solve_triangular(factor, values, lower=True)
+    return np.asarray(-np.log(np.diag(factor)).sum() - 0.5 * np.einsum("ij,ij->j", white, white))
+
+
 @dataclass(frozen=True, eq=False)
 class FieldErrors:
     family: str | None  # whose size they share; ``None`` where they have the size one
@@ -214,13 +221,21 @@ class FieldModel:
         weight = inverse @ self._seen[:, -1]
         return np.asarray(0.5 * (parts @ (np.outer(weight, weight) - inverse).ravel()))
 
-    def draw(self, sizes: Sizes, scales: Floats, random: np.random.Generator, within: Floats | None = None) -> Floats:
+    def draw(
+        self,
+        sizes: Sizes,
+        scales: Floats,
+        random: np.random.Generator,
+        within: Floats | None = None,
+        observed: Floats | None = None,
+    ) -> Floats:
         """Exact draws (N, k + …), one for each of N sizes of noise and families (N, F), of which many may be the same.
 
         Parameters, not a number where they have no prior; then of each error its coefficients, in standard deviations at the
         size one, and, where its covariance is not by its columns, n numbers w more, for which its errors at any places are
         larger by (covariance with the p places) · ``shown(impulse)``ᵀ · w. ``within``: (N, k) of the observations of which
-        limits are known, how far each is from what is ``observed`` of it.
+        limits are known, how far each is from what is ``observed`` of it. ``observed``: (N, n) of the combinations, as
+        other observations of each draw have them (:attr:`combined`).
         """
         table = np.column_stack([*vars(sizes).values(), scales])
         order = np.lexsort(table.T[::-1])
@@ -228,10 +243,28 @@ class FieldModel:
         found = np.empty((len(scales), len(self.linear.unknowns) + len(self._stacked[2])))
         for rows in np.split(order, np.flatnonzero(new)[1:]):
             i = int(rows[0])
-            observed = self._seen[:, -1]
+            found_in = self.combined if observed is None else observed[rows]
             if within is not None:
-                observed = observed + np.pad(within[rows], ((0, 0), (len(observed) - within.shape[1], 0)))
-            found[rows] = self._drawn(sizes.at(slice(i, i + 1)), scales[i], len(rows), random, observed)
+                found_in = found_in + np.pad(within[rows], ((0, 0), (len(self.combined) - within.shape[1], 0)))
+            found[rows] = self._drawn(sizes.at(slice(i, i + 1)), scales[i], len(rows), random, found_in)
+        return found
+
+    @property
+    def combined(self) -> Floats:
+        """(n,) what was observed of the combinations, beyond what is expected of them beforehand."""
+        return np.asarray(self._seen[:, -1])
+
+    def log_densities(self, sizes: Sizes, scales: Floats, observed: Floats, without: int) -> Floats:
+        """(w, N) of the last ``without`` observations given all others, up to a constant, by sizes (w,) and (w, F).
+
+        ``observed``: (n, N) combinations, which differ in those observations alone.
+        """
+        found = np.empty((len(scales), observed.shape[1]))
+        last = self.into[len(self.into) - without :]
+        others = scipy.linalg.null_space(last)  # combinations of the other observations alone
+        for i, scale in enumerate(scales):
+            whole = self._covariance(sizes.at(slice(i, i + 1)), scale[None])[0]
+            found[i] = _log_normal(whole, observed) - _log_normal(others.T @ whole @ others, others.T @ observed)
         return found
 
     @cached_property

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 # quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
 # show of errors left out. Those of all further recordings together.
-MOST, _MOST_FURTHER = 200, 150
+MOST, MOST_FURTHER = 200, 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +190,7 @@ def given_together(
     taken, told, warned = list[FurtherRecording](), list[FurtherCertificate](), list[Text]()
     if not further:
         return JointRecordings()
-    beside, most = ALONE, _MOST_FURTHER // len(further)
+    beside, most = ALONE, MOST_FURTHER // len(further)
     first = FurtherRecording(model, own_noise(model, state.unmodelled, seed))
     for one in further:
         _, other = recording_of(one.job, seed, most)
@@ -270,9 +270,10 @@ class GivenRecordings:
     given: bool = False  # whether together, by the recording of its calibration
     further: FurtherCertificates = NO_FURTHER
     passed: tuple[PassedTest, ...] = ()
-    without: MachineState | None = (
-        None  # the state without the tests that it passed; ``None`` where none is reckoned with
-    )
+    # the state without the tests that it passed; ``None`` where none is reckoned with
+    without: MachineState | None = None
+    # of its calibration, and those that are taken together with it, where all of its errors follow from these
+    recordings: tuple[RecordingModel, FurtherRecordings] | None = None
 
 
 def given_recordings(
@@ -311,4 +312,7 @@ def given_recordings(
         text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
     further = replace(others.told, warnings=(*others.told.warnings, *warned))
     text = after(text, others.told.together)
-    return GivenRecordings(together, text, True, further, tests, without if taken is not others.taken else None)
+    passing = taken is not others.taken
+    beside = FurtherRecordings(others.taken.recordings, partial(causes_of, circumstances=job.circumstances))
+    alone = without if passing else None
+    return GivenRecordings(together, text, True, further, tests, alone, None if passing else (model, beside))

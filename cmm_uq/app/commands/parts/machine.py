@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq import __version__
+from cmm_uq.analysis.machine.recordings import FurtherRecordings
 from cmm_uq.analysis.machine.regions import with_readings
 from cmm_uq.analysis.machine.state import MachineState, machine_stated, with_bounds
 from cmm_uq.app.commands.certificates.again import compute_machine_again
@@ -40,6 +41,7 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.source import sha256 as hashes
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import stated_axes
+from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.stated import physics_of
 from cmm_uq.maths.inference.draws import Draws
 
@@ -113,6 +115,7 @@ class StatedMachine:
     warnings: tuple[Text, ...]  # what the reader must know of it
     history: bytes | None = None  # that its changes since follow from; ``None`` where no records were asked
     without: MachineState | None = None  # its state without the tests that it passed, where some are reckoned with
+    recordings: tuple[RecordingModel, FurtherRecordings] | None = None  # that all of its errors follow from
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,10 +176,9 @@ def state_machine(
     passed, change = job.facts.machine_state.passed, known.change if known else None
     found = given_recordings(state, stated.job, more, passed, change, seed)
     state, further = found.state, found.further
-    circular = standing.circular or any(one.job.facts.certified_on_this_machine for one in more)
     standing = replace(
         standing,
-        circular=circular,
+        circular=standing.circular or any(one.job.facts.certified_on_this_machine for one in more),
         path=found.path,
         drift=since.told,
         given_recording=found.given,
@@ -192,7 +194,7 @@ def state_machine(
         )
     if rerun and stated.not_again:
         told = [stated.not_again, *told]
-    return StatedMachine(state, standing, stated.job, tuple(told), since.history, found.without)
+    return StatedMachine(state, standing, stated.job, tuple(told), since.history, found.without, found.recordings)
 
 
 def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:

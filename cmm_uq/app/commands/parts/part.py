@@ -25,6 +25,7 @@ from cmm_uq.analysis.parts.ways import spread, ways
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
 from cmm_uq.app.commands.parts.drift import further_of
 from cmm_uq.app.commands.parts.machine import StatedMachine, state_machine, with_calibration, with_history
+from cmm_uq.app.commands.parts.proposals import foresee
 from cmm_uq.app.commands.reading import in_language
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
@@ -133,12 +134,12 @@ def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage
         further, decisions, together, tuple(reductions),
         point_errors(virtual, seed=seed), (x, y, z), standing, compare_methods(characteristics, shares, methods),
         digits=options.digits, seed=seed, asked=trials, warnings=(*of_part.warnings, *machine.warnings),
-        files=files, influence=influence,
+        files=files, influence=influence, recordings=machine.recordings,
     )  # fmt: skip
-    if not (withheld := decided_without(found)):
-        return found
-    judged = tuple(one and one.not_passing for one in decisions)
-    return replace(found, judged=judged, withheld=withheld, warnings=(*found.warnings, *withheld))
+    if withheld := decided_without(found):
+        judged = tuple(one and one.not_passing for one in decisions)
+        found = replace(found, judged=judged, withheld=withheld, warnings=(*found.warnings, *withheld))
+    return foresee(found, stage)
 
 
 def _with_without(
