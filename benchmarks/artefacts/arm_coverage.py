@@ -1,11 +1,12 @@
 """Robots that a tracker measured, by equations that share no code with the package: do certificates hold what is true?
 
-Run:  python -m benchmarks.artefacts.arm_coverage coverage|diagnosis COUNT [FIRST]
+Run:  python -m benchmarks.artefacts.arm_coverage coverage|tails|diagnosis COUNT [FIRST]
 
 Each robot has rows of its own (industrial, with parallel axes 2 and 3 and a wrist), a tool, a place of the tracker and poses;
 errors of its rows are drawn from half of what the package holds for possible, or from a tenth of it. Places are products of
 4 × 4 matrices. Counted are true values within 95 % intervals of parameters that are determined, points held out within theirs,
-and diagnoses that find something where nothing was left out.
+and diagnoses that find something where nothing was left out; *tails* has noise that grows with the distance from the base,
+t of four degrees of freedom.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +61,7 @@ def place(rows: Floats, q: Floats, tool: Floats) -> Floats:
     return np.asarray((frame @ np.append(tool, 1.0))[:3])
 
 
-def robot(seed: int, left_out: str) -> tuple[dict[str, bytes], dict[tuple[str, str], float]]:
+def robot(seed: int, left_out: str, *, tails: bool = False) -> tuple[dict[str, bytes], dict[tuple[str, str], float]]:
     """A job of one robot, the truth by effect and parameter in their units, with what the model leaves out, if anything."""
     random = np.random.default_rng([20261130, seed])
     size = random.uniform(0.5, 1.8)
@@ -97,7 +99,11 @@ def robot(seed: int, left_out: str) -> tuple[dict[str, bytes], dict[tuple[str, s
     turn, _ = np.linalg.qr(random.standard_normal((3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     noise = random.uniform(0.01, 0.08)
-    seen = np.array(places) @ turn.T + random.uniform(-3000, 3000, 3) + random.normal(0, noise, (count, 3))
+    scale = np.full((count, 1), noise)
+    if tails:
+        away = np.sum(np.array(places) ** 2, axis=1, keepdims=True)
+        scale = noise * np.sqrt(0.3 + 0.7 * away / away.mean()) * np.sqrt(4 / random.chisquare(4, (count, 1)))
+    seen = np.array(places) @ turn.T + random.uniform(-3000, 3000, 3) + scale * random.normal(0, 1, (count, 3))
     places_of = {"": "xyz", "reference_": "xyz"}
     shown_xyz, seen_xyz = ([f"{what}{axis}_mm" for axis in axes] for what, axes in places_of.items())
     head = ",".join(["measurement", "point", *shown_xyz, *(f"q{i}_deg" for i in range(1, 7)), "approach_q1", *seen_xyz])
@@ -129,9 +135,9 @@ effects = {list(NAMED)}
     return {"job.toml": text.encode(), "recording.csv": ("\n".join(lines) + "\n").encode()}, truth
 
 
-def covered(seed: int) -> Counter[str]:
+def covered(seed: int, *, tails: bool = False) -> Counter[str]:
     """Of the named model alone, as a certificate states it where its diagnosis finds nothing."""
-    files, truth = robot(seed, left_out="")
+    files, truth = robot(seed, left_out="", tails=tails)
     job, found = job_of(files), Counter[str]()
     with physics_of(job):
         model, estimate, _ = with_noise(screened_model(job)[0])
@@ -181,7 +187,7 @@ def shown(total: Mapping[str, int]) -> str:
 
 
 if __name__ == "__main__":
-    study = {"coverage": covered, "diagnosis": diagnosed}[sys.argv[1]]
+    study = {"coverage": covered, "tails": partial(covered, tails=True), "diagnosis": diagnosed}[sys.argv[1]]
     total, start = Counter[str](), time.monotonic()
     first = int(sys.argv[3]) if len(sys.argv) > 3 else 0
     for number in range(first, first + int(sys.argv[2])):

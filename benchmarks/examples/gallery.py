@@ -43,6 +43,7 @@ EXAMPLES = {
     "multilateration": "multilateration-simulated",
     "tracked_points": "robot-simulated",
     "table_spheres": "table-spheres-simulated",
+    "seat": "arm-seat-simulated",
     "shift": "shift-simulated",
     "shift_plate": "shift-plate-simulated",
     "error_map": "iota-1102-maps",
@@ -51,7 +52,7 @@ EXAMPLES = {
 FIGURES = {"ballbar": "ranking", "step_gauge": "trumpet"}
 PLANNED = {"ballbar": "plan-ballbar", "step_gauge": "plan-step-gauge"}  # jobs that have no recording yet
 LENGTHS = {"bryan": "\n[plan]\nlength_mm = 300.0\n", "gauge_blocks": "\n[plan]\nlengths_mm = [100.0, 300.0, 500.0]\n"}
-NOT_PLANNED = ("plate_two_dates", "scanned_planes", "tracked_points", "shift_plate", "error_map", "part")
+NOT_PLANNED = ("plate_two_dates", "scanned_planes", "tracked_points", "seat", "shift_plate", "error_map", "part")
 MAIN_FIGURE = {"part": 1}  # of the page, where it is not the first
 
 

@@ -78,6 +78,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType({row[0]: Unit(*row) for row in (
     ("″/m", r"\arcsecond\metre\tothe{-1}", "arcsecond per meter", ARCSECOND),
     ("″/K", r"\arcsecond\kelvin\tothe{-1}", "arcsecond per kelvin", ARCSECOND),
     ("″/(m·K)", r"\arcsecond\metre\tothe{-1}\kelvin\tothe{-1}", "arcsecond per meter and kelvin", ARCSECOND),
+    ("″/(m·kg)", r"\arcsecond\metre\tothe{-1}\kilogram\tothe{-1}", "arcsecond per meter and kilogram", ARCSECOND),
     ("″/(m K)", r"\arcsecond\metre\tothe{-1}\kelvin\tothe{-1}", "arcsecond per meter and kelvin", ARCSECOND),
     ("K", r"\kelvin", "kelvin", 1.0),
     ("°C", r"\degreecelsius", "degree Celsius", 1.0),
@@ -122,6 +123,7 @@ PRINTED: Mapping[str, Unit] = MappingProxyType({ending: UNITS[symbol] for ending
     "per_k": "1/K", "um_per_h": "µm/h", "arcsec_per_m": "″/m", "arcsec_per_m_k": "″/(m K)", "arcsec_per_k": "″/K", "ms": "ms",
     "um_per_m": "µm/m", "um_per_mm": "µm/mm", "um_per_m2": "µm/m²", "um_per_deg": "µm/°", "um_per_k": "µm/K",
     "um_per_m_k": "µm/(m·K)", "ppm_per_h": "ppm/h", "ppm_per_k": "10⁻⁶/K", "um_per_kg": "µm/kg", "um_s2_per_m": "µm·s²/m",
+    "arcsec_per_m_kg": "″/(m·kg)",
 }.items()})  # fmt: skip
 """Units as printed, by the ending of a quantity's name."""
 

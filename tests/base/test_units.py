@@ -30,6 +30,7 @@ SPELLED = {
     "1": "dimensionless", "10⁻⁶/K": "ppm/delta_degC", "1/K": "1/delta_degC", "°": "degree", "″": "arcsecond",
     "″/m": "arcsecond/m", "″/K": "arcsecond/delta_degC", "″/(m·K)": "arcsecond/m/delta_degC",
     "″/(m K)": "arcsecond/m/delta_degC", "K": "delta_degC", "°C": "delta_degC", "µm/°": "µm/degree",
+    "″/(m·kg)": "arcsecond/m/kg",
 }  # fmt: skip
 """As pint spells what it does not read as it is printed; a difference of temperatures."""
 

@@ -18,6 +18,7 @@ from scipy.special import fdtri, stdtrit
 from cmm_uq.analysis.diagnosis.held_out import numbered_by_place, predicted_folds
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import TrackedFacts
+from cmm_uq.artefacts.optical.pose_noise import PoseNoise, pose_noise, reaches
 from cmm_uq.artefacts.plate import REFERENCES, Plate, shape_of as shape_of_plate
 from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, D
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
@@ -101,6 +102,14 @@ def shape_of(facts: ReferencedFacts, points: Points) -> ArtefactShape | None:
 SCREENING = Screening(shape_of)
 
 
+def noise_by_pose(model: RecordingModel) -> PoseNoise:
+    """What the model leaves at each pose of which all coordinates are used."""
+    found, points, rows = model.estimate().least_squares, model.artefact.points, model.artefact.rows[model.used, 0]
+    whole = np.flatnonzero(np.bincount(rows, minlength=len(points)) == 3)
+    left = found.residuals[np.isin(rows, whole)].reshape(-1, 3)
+    return pose_noise(left, reaches(points)[whole], found.degrees_of_freedom * left.size / len(rows))
+
+
 @dataclass(frozen=True, eq=False)
 class PredictedPoses:
     rows: Ints  # (n,) of the recording, those of which all coordinates are used
@@ -113,9 +122,10 @@ def predicted_poses(model: RecordingModel) -> PredictedPoses | None:
     """By the named model and the residuals that it leaves; ``None`` where a set-up has too few points to leave any out."""
     if len(np.unique(model.artefact.points.point)) < 2 * len(model.unknowns) / 3 + 4:
         return None
-    linear, found = model.estimate().linear, model.estimate().least_squares
-    sigma, degrees = found.sigma_of_residuals, found.degrees_of_freedom
-    points, rows = model.artefact.points, model.artefact.rows[model.used, 0]
+    points, rows, noise = model.artefact.points, model.artefact.rows[model.used, 0], noise_by_pose(model)
+    sigma, degrees, scale = noise.sigma, noise.degrees, noise.scale(reaches(points)[rows])
+    linear = model.estimate().linear
+    linear = replace(linear, noise_scale=linear.noise_scale * scale)
     numbers = np.column_stack([points.measurement, points.point])
     if joined(points.machine):  # all reflectors that were seen at one pose
         numbers = np.column_stack([points.columns[name] for name in points.machine.columns_of_joints])
@@ -127,7 +137,7 @@ def predicted_poses(model: RecordingModel) -> PredictedPoses | None:
         each, of_each = error[whole].reshape(-1, 3) / sigma, root[whole].reshape(-1, 3, root.shape[1])
         covariance = np.eye(3) + of_each @ of_each.transpose(0, 2, 1)
         taken.append(rows[out][first[count == 3]])
-        off.append(np.linalg.norm(each, axis=1) * sigma)
+        off.append(np.linalg.norm(each, axis=1) * sigma * scale[out][first[count == 3]])
         within.append(np.abs(each) <= stdtrit(degrees, 0.975) * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)))
         squares = np.einsum("ni,ni->n", each, np.linalg.solve(covariance, each[:, :, None])[:, :, 0])
         inside.append(squares <= 3 * fdtri(3, degrees, 0.95))
@@ -154,6 +164,9 @@ def results(result: Result) -> dict[str, Any]:
         shares = (float(inside.mean()) for inside in (predicted.within, predicted.inside))
         shown = dict(zip(_SHARES, shares, strict=True))
         found["held_out"] = {**_figures(predicted.off), **shown, "points": len(predicted.off)}
+        noise = noise_by_pose(result.model)
+        named = {"sigma_um": noise.sigma / MICROMETRE, "growing": noise.growing}
+        found["left_at_a_pose"] = {**named, "degrees_of_freedom": noise.degrees}
     points, machine = result.artefact.points, result.artefact.points.machine
     rows: dict[str, Any] = {}
     if joined(machine):
@@ -241,7 +254,15 @@ def _table(data: dict[str, Any], result: Result) -> Table | None:
             "within U (95 %), and how many points within the 95 % ellipsoid of all three.",
             count=found["held_out"]["points"],
         )
-        notes.append(held_out)
+        one = found["left_at_a_pose"]
+        left = say(
+            "What is left at a pose: {sigma} µm in a coordinate at the mean reach, {share:.0f} % of its square from what "
+            "grows with the reach of the joints, with tails of the t distribution of {degrees:.0f} degrees of freedom.",
+            sigma=rounded(one["sigma_um"], one["sigma_um"] / 10)[0],
+            share=100 * one["growing"],
+            degrees=one["degrees_of_freedom"],
+        )
+        notes += [held_out, left]
     if "poses" not in data:
         iso = say(
             "This is a calibration. Pose accuracy and repeatability (ISO 9283) need poses that were commanded and repeated."

@@ -21,7 +21,7 @@ Named = Callable[[str], str]  # how a value is called in the field, by its name:
 _UNIT_OF = (
     ("arcsec_per_m_k", "″/(m·K)"), ("arcsec_per_m", "″/m"), ("um_per_m", "µm/m"), ("um_per_h", "µm/h"), ("ppm_per_h", "ppm/h"),
     ("per_k", "1/K"), ("arcsec", "″"), ("ppm", "ppm"), ("um", "µm"), ("mm", "mm"), ("rad", "rad"), ("deg", "°"), ("_c", "°C"),
-    ("_k", "K"), ("_s", "s"),
+    ("_k", "K"), ("_s", "s"), ("arcsec_per_m_kg", "″/(m·kg)"),
 )  # fmt: skip
 """Ends of names in results.json, and their units."""
 

@@ -53,6 +53,7 @@ ARCSECOND = pi / 180 / 3600
 SI = {
     "um": 1e-6, "mm": 1e-3, "ppm": 1e-6, "arcsec": ARCSECOND, "rad": 1.0, "deg": pi / 180, "c": 1.0, "k": 1.0, "s": 1.0,
     "h": 3600.0, "mm2": 1e-6, "arcsec_per_m": ARCSECOND, "per_k": 1.0, "um_per_h": 1e-6 / 3600, "arcsec_per_m_k": ARCSECOND,
+    "arcsec_per_m_kg": ARCSECOND,
 }  # fmt: skip
 """SI size of the unit that a key of results.json ends in: the contract of the file, from shared/formats.md."""
 

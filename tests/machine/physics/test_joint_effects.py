@@ -102,6 +102,17 @@ def test_play_goes_by_the_side_that_a_joint_came_from() -> None:
         assert_allclose(moved, tool_at(q, {(3, "theta"): 30 * SECOND * side}) - tool_at(q, {}), rtol=0, atol=3e-5)
 
 
+def test_a_payload_bends_a_joint_by_its_weight_and_the_lever_of_the_tool() -> None:
+    """As sag of so many ″/m does, times what each pose carries; nothing without a payload."""
+    payload = np.array([0.0, 2.0, 5.0, 0.5, 3.0, 1.0, 0.0])
+    points = points_of(payload_kg=payload)
+    e = effects_of_arm(points)["compliance_q2"].displacement(points, {"arcsec_per_m_kg": 30.0})
+    for q, mass, moved in zip(readings(points), payload, e, strict=True):
+        ((of, angle),) = of_sag(q).items()
+        assert_allclose(moved, tool_at(q, {of: mass * angle}) - tool_at(q, {}), rtol=0, atol=2e-4)
+    assert np.abs(e[payload == 0]).max() == 0 < np.abs(e[payload > 1]).max()
+
+
 def test_links_sag_by_the_mean_of_the_joints_beyond() -> None:
     """At zero joint 4's origin is that of joint 3's row end, and 5 and 6 lie 720 mm farther: lever (1.12 + 2·1.12+…)/3."""
     points = points_of()

@@ -213,6 +213,19 @@ class SagOfLinks(Sag):
         return beyond.mean(axis=1) if beyond.shape[1] else pose.tool
 
 
+class Compliance(Sag):
+    """A joint yields to what is added at the tool, in proportion to its recorded mass: the weight over its stiffness."""
+
+    family, title = "compliance", say("Compliance of joint {axis} under a payload")
+    formula = "θ = reading + θ₀ + c·payload·u·((tool − origin) × down)"
+    points_to = say("joint {axis} yields to the payload: compensate by load and pose, or check its gear and bearings")
+    coefficients = (Parameter("arcsec_per_m_kg", unit("″/(m·kg)"), 200.0),)
+    columns = ("payload_kg",)
+
+    def amount(self, points: Points, shape: Sequence[float]) -> Floats:
+        return super().amount(points, shape) * points.column(self.columns[0])
+
+
 class ToolOffset(OfRows):
     """Where the tool's point, or each reflector, is on the flange: along the axes of the last frame."""
 
@@ -242,7 +255,15 @@ def tips_of(points: Points) -> Floats:
 
 
 _EVERY: tuple[Callable[[str], OfJoint], ...] = (Zero, Length, Twist, Offset, Parallelism)
-_REVOLUTE: tuple[Callable[[str], OfJoint], ...] = (Eccentricity, Ovality, GearError, Slack, Sag, SagOfLinks)
+_REVOLUTE: tuple[Callable[[str], OfJoint], ...] = (
+    Eccentricity,
+    Ovality,
+    GearError,
+    Slack,
+    Sag,
+    SagOfLinks,
+    Compliance,
+)
 
 
 def effects_of_arm(points: Points) -> dict[str, Effect]:
