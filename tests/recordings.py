@@ -15,7 +15,7 @@ from cmm_uq.analysis.screening.screening import ScreenedRecording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.base.rotary import Turntable
+from cmm_uq.base.rotary import RotaryAxis, RotaryMachine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.physics.effect import Effect
 
@@ -51,9 +51,9 @@ def on_table(points: Points, effect: Effect) -> Points:
     if not letter:
         return points
     old, random = points.machine, np.random.default_rng(3)
-    machine = Turntable(
-        old.name, old.chain, old.travel_mm, old.origin_mm, letter=letter, axis_mm=np.array([1.0, 2.0, 3.0])
-    )
+    own = RotaryAxis(letter, np.array([1.0, 2.0, 3.0]), head=getattr(effect, "head", False))
+    stylus = np.array([10.0, -20.0, -150.0])
+    machine = RotaryMachine(old.name, old.chain, old.travel_mm, old.origin_mm, rotary=(own,), stylus_mm=stylus)
     approach = random.choice([-1.0, 1.0], len(points))
     turned = with_columns(
         points, **{f"{letter}_deg": random.uniform(0, 360, len(points)), f"{letter}_approach": approach}

@@ -19,7 +19,7 @@ from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.artefacts.digitizer import THREE, scan
 from cmm_uq.artefacts.triangle import TriangleStandard, placed_triangle
 from cmm_uq.base.points import Floats, Ints, Machine, Points
-from cmm_uq.base.rotary import Turntable
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.physics.catalogue import effects
@@ -409,7 +409,7 @@ def table_spheres() -> Simulated:
     points = replace(
         recording(np.tile(sphere, (n, 1)), np.ones(2 * n, dtype=np.int64), np.tile([1, 2], n), np.repeat(np.arange(n) + 1, 2),
                   c_deg=np.repeat(angle, 2), c_approach=np.repeat([0.0, 1.0, -1.0], [2, 14, 14])),
-        machine=Turntable(MACHINE.name, "XYZ", MACHINE.travel_mm, axis),
+        machine=RotaryMachine(MACHINE.name, "XYZ", MACHINE.travel_mm, axis),
     )  # fmt: skip
     truth: dict[str, float | Sequence[float]] = {
         "rotary_location_c_x": 1.5, "rotary_location_c_y": -0.8, "rotary_tilt_c_x": 1.2, "rotary_tilt_c_y": 0.5,
@@ -498,7 +498,7 @@ noise of a coordinate {example.noise_um:g} µm.\"\"\"
 
 [machine]
 name = "{MACHINE.name}"
-chain = "{example.points.machine.chain}{"|C" if isinstance(example.points.machine, Turntable) else ""}"
+chain = "{example.points.machine.chain}{"|C" if isinstance(example.points.machine, RotaryMachine) else ""}"
 travel_mm = {{ x = [0, 900], y = [0, 1200], z = [-600, 0] }}
 {example.machine}
 [artefact]

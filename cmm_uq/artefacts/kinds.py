@@ -364,6 +364,9 @@ TRACKED_POINTS = Kind(
 class TableSpheresFacts(UncertifiedFacts):
     """Where the spheres are planned to stand on the table."""
 
+    stay: bool = key(
+        False, "Whether the spheres stayed where they are through all measurements, each being a run of axes."
+    )
     radius_mm: Length = key(200.0, "Distance of both spheres from the table's axis, for a plan.")
     height_mm: Length = key(200.0, "By how much sphere B lies higher than sphere A along the axis, for a plan.")
     low_mm: Position = key(0.0, "Height of sphere A above the stated point of the table's axis, for a plan.")
@@ -380,7 +383,7 @@ _TABLE = f"{_HERE}.spheres.table_spheres"
 _AXIS = tuple(f"rotary_{name}" for name in ("location_c_x", "location_c_y", "tilt_c_x", "tilt_c_y", "positioning_c_1"))
 TABLE_SPHERES = Kind(
     "table_spheres", TableSpheresFacts, f"{_TABLE}:TableSpheres", f"{_TABLE}:SCREENING", f"{_TABLE}:PLANNING",
-    f"{_TABLE}:PAGE", Beginning(
+    f"{_TABLE}_page:PAGE", Beginning(
         title="Two spheres on a turning table (ISO 10360-3)",
         numbering="One measurement is one load of the table; points 1 and 2 are the centres of spheres A and B, repeat counts "
         "the positions of the table in their order.",

@@ -80,6 +80,10 @@ class Machine:
     def as_recorded(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
         return xyz
 
+    def columns_as_recorded(self, columns: Mapping[str, Floats]) -> Mapping[str, Floats]:
+        """Columns as in the recording, of those along the axes of the coordinates."""
+        return columns
+
     def travel(self, axis: str) -> tuple[float, float]:
         """Lowest and highest scale reading of an axis, mm; a ``CmmUqError`` where the job does not give them."""
         (low, high), key, given = self.limits_of(axis)

@@ -19,6 +19,7 @@ from cmm_uq.base.rotary import ROTARY
 from cmm_uq.base.units import unit
 
 COORDINATES = ("x_mm", "y_mm", "z_mm")
+SENSORS = tuple(f"sensor_{a}_um" for a in AXES)
 REQUIRED = ("measurement", "point", *COORDINATES)
 WHOLE = ("measurement", "point", "repeat")
 
@@ -58,20 +59,34 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     "depth_mm": "Scan depth of the point, along the digitizer's line of sight.",
     "turned_deg": "By how much a sphere was turned about Z against its first set-up: what turns with it is its own form.",
     **{f"tip_{a}_mm": f"Offset of the stylus tip from the end of the ram, along {a}." for a in AXES},
-    **{f"{a}_deg": f"Reading of the rotary table {a.upper()}, where the machine's chain has one." for a in ROTARY},
-    **{f"{a}_approach": f"How the rotary table {a.upper()} turned into the point: −1, 0 or +1." for a in ROTARY},
+    **{f"{a}_deg": f"Reading of the rotary axis {a.upper()}, where the machine's chain has one." for a in ROTARY},
+    **{f"{a}_approach": f"How the rotary axis {a.upper()} turned into the point: −1, 0 or +1." for a in ROTARY},
+    **{f"sensor_{a}_um": f"Sphere in a nest of sensors, off the place that the machine went to, along {a} of the machine."
+       for a in AXES},
     "radius_mm": "Radius of the fit that gave the point.",
     "fit_rms_um": "Root mean square of the residuals of the fit that gave the point.",
     "n_points": "Number of points of the fit that gave the point.",
 })  # fmt: skip
 _OF_SOME_MACHINES = re.compile(
-    r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg|[abc]_approach|load_kg|(acceleration|since_reversal)_.*"
+    r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg|[abc]_approach|sensor_.*|load_kg|(acceleration|since_reversal)_.*"
 )
 # columns that a recording may have, and that are refused in another unit than that of their name
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
 # what instruments read, which the kinds that go by it describe
 READINGS = (
-    *("reading_um", "reading_mm", "reading_arcsec", "straightedge", "square", "u_mm", "v_mm", "alpha_deg", "beta_deg"),
+    *(
+        "reading_um",
+        "reading_mm",
+        "reading_arcsec",
+        "straightedge",
+        "square",
+        "face",
+        "face_arcsec",
+        "u_mm",
+        "v_mm",
+        "alpha_deg",
+        "beta_deg",
+    ),
     *(f"{name}_{a}" for name in ("read", "turn") for a in AXES),
 )
 LARGEST_NUMBER = 1e9  # of a measurement, point or repeat

@@ -12,9 +12,11 @@ import numpy as np
 from cmm_uq.base.arm import Arm, rows_of_screws
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine, Points
-from cmm_uq.base.rotary import Turntable
-from cmm_uq.jobs.columns import COORDINATES, REQUIRED
+from cmm_uq.base.rotary import NORMALS, RotaryAxis, RotaryMachine
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.columns import COORDINATES, REQUIRED, SENSORS
 from cmm_uq.jobs.tables.machine import MachineFacts, stated_axes
+from cmm_uq.jobs.tables.rotary_axes import RotaryAxisFacts, parts_of_chain
 from cmm_uq.maths.geometry.feature import nearest_rotations
 
 _FINEST = 9  # decimals of a number that is looked at as printed
@@ -22,40 +24,60 @@ _ROUNDING = 1e-6  # of a reading, °
 
 
 def machine_of(facts: MachineFacts) -> Machine:
-    """Of three carriages, or with a rotary table too; or an arm of joints."""
+    """Of three carriages, or with rotary axes too; or an arm of joints."""
     if facts.joint:
         return _arm(facts)
     travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
-    carriages, _, letter = facts.chain.partition("|")
+    carriages, head, tables = parts_of_chain(facts.chain)
     every = (facts.name, carriages, travel, np.array(facts.origin_mm, dtype=np.float64))
-    read_by, table = stated_axes(facts.axes), facts.table
-    if not letter:
-        return Machine(*every, read_by=read_by)
-    axis = None if table.axis_mm is None else np.array(table.axis_mm, dtype=np.float64)
-    turns = np.array(table.travel_deg or [np.nan, np.nan], dtype=np.float64)
-    return Turntable(
-        *every, read_by=read_by, letter=letter.lower(), axis_mm=axis, travel_deg=turns,
-        clockwise=table.turns == "clockwise", recorded_in_machine=table.coordinates == "machine",
+    if not head + tables:
+        return Machine(*every, read_by=stated_axes(facts.axes))
+    stated: dict[str, RotaryAxisFacts] = {each.name: each for each in facts.rotary}
+    stated = {tables: facts.table, **stated}
+    return RotaryMachine(
+        *every, read_by=stated_axes(facts.axes), stylus_mm=np.array(facts.head.stylus_mm or [0.0, 0.0, 0.0]),
+        rotary=tuple(
+            _rotary(name, stated.get(name, RotaryAxisFacts()), head=i >= len(tables)) for i, name in enumerate(tables + head)
+        ),
+        tip_on_every_carriage=bool(head), recorded_in_machine=facts.table.coordinates == "machine",
+        normals_in_machine=facts.table.normals == "machine", recorded_at_ram=facts.head.coordinates == "carriages",
     )  # fmt: skip
 
 
-def in_coordinates(points: Points, where: str) -> Points:
-    """A recording at the coordinates of what was measured; what does not go with its machine's rotary table is refused."""
+def _rotary(name: str, facts: RotaryAxisFacts, *, head: bool) -> RotaryAxis:
+    axis = None if facts.axis_mm is None else np.array(facts.axis_mm, dtype=np.float64)
+    turns = np.array(facts.travel_deg or [np.nan, np.nan], dtype=np.float64)
+    return RotaryAxis(name.lower(), axis, turns, clockwise=facts.turns == "clockwise", head=head)
+
+
+def in_coordinates(points: Points, facts: MachineFacts, where: str) -> Points:
+    """A recording at the coordinates of what was measured; what does not go with its machine's rotary axes is refused."""
     machine = points.machine
-    if not isinstance(machine, Turntable) or machine.column not in points.columns:
+    if not isinstance(machine, RotaryMachine):
         return points
-    read, (low, high) = points.columns[machine.column], machine.travel_deg
-    beyond = (read < low - _ROUNDING) | (read > high + _ROUNDING)
-    if beyond.any():
-        row = int(np.argmax(beyond))
-        said = f"{machine.column} = {read[row]:g} lies outside the travel of the table, {low:g} to {high:g} °"
-        fix = "Mend it, or travel_deg in [machine.table]"
-        raise CmmUqError(said, where=f"{where} line {points.lines[row]}", fix=fix)
-    if np.any(read) and any(f"n{axis}" in points.columns for axis in AXES):
-        said = "has normals of probed points, which do not say with a turned table whether they turned with it"
-        fix = f"Leave nx, ny, nz out, or measure with the table at 0 and leave {machine.column} out"
-        raise CmmUqError(said, where=where, fix=fix)
-    return replace(points, xyz=machine.from_recorded(points.xyz, points.columns))
+    columns = dict(points.columns)
+    for axis in machine.rotary:
+        (low, high), read = axis.travel_deg, columns.get(axis.column, np.zeros(len(points)))
+        beyond = (read < low - _ROUNDING) | (read > high + _ROUNDING)
+        if axis.column in columns and beyond.any():
+            row, what = int(np.argmax(beyond)), "head" if axis.head else "table"
+            said = f"{axis.column} = {read[row]:g} lies outside the travel of the {what}, {low:g} to {high:g} °"
+            key = "[machine.table]" if len(machine.rotary) == 1 and not axis.head else "[[machine.rotary]]"
+            raise CmmUqError(said, where=f"{where} line {points.lines[row]}", fix=f"Mend it, or travel_deg in {key}")
+    if all(name in columns for name in NORMALS) and any(np.any(columns.get(t.column, 0.0)) for t in machine.tables):
+        if facts.table.normals is None:
+            said = "has normals of probed points, which do not say with a turned table whether they turned with it"
+            fix = 'Say it, normals = "table" or "machine" in [machine.table]; or leave nx, ny, nz out'
+            raise CmmUqError(said, where=where, fix=fix)
+        columns |= machine.normals(columns, back=True)
+    if machine.head:
+        tips = np.broadcast_to(machine.tip(columns), points.xyz.shape)
+        columns |= {f"tip_{a}_mm": tip for a, tip in zip(AXES, tips.T, strict=True)}
+    xyz = machine.from_recorded(points.xyz, columns)
+    if any(name in columns for name in SENSORS):
+        read = np.column_stack([columns.pop(name, np.zeros(len(xyz))) for name in SENSORS])
+        xyz = xyz + machine.turned_back(MICROMETRE * read[:, :, None], columns)[:, :, 0]
+    return replace(points, xyz=xyz, columns=columns)
 
 
 def _arm(facts: MachineFacts) -> Arm:

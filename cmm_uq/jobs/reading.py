@@ -157,7 +157,9 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     points, recognised = read_recording_file(
         inputs[facts.recording.file], where, machine, facts.recording, acquired.without if acquired else ()
     )
-    points = replace(in_coordinates(points, where), in_seconds=acquired is not None and not acquired.changed)
+    points = replace(
+        in_coordinates(points, facts.machine, where), in_seconds=acquired is not None and not acquired.changed
+    )
     told = [recognised, None if says is None else says.recognised]
     facts, points, further = _certified_points(facts, points, inputs, source, says, told)
     told.append(further)
@@ -167,7 +169,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
         points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
     if earlier is not None:
         then, recognised = read_recording_file(inputs[earlier], str(folder / earlier), machine, facts.recording)
-        then = in_coordinates(then, str(folder / earlier))
+        then = in_coordinates(then, facts.machine, str(folder / earlier))
         told.append(recognised)
         compared.refuse_copy(points, then, planned, f"{path}: [recording] earlier")
         points = compared.against_earlier(points, then, facts.artefact.cte_per_k, where)

@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.base.rotary import Turntable
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE
 
 ORIGIN = np.array([10.0, -20.0, 30.0])
@@ -22,7 +22,7 @@ READ = np.array([[110.0, -20.0, 35.0, 0.0], [110.0, -20.0, 35.0, 90.0]])
 
 
 def turned() -> Points:
-    machine = Turntable("turntable", origin_mm=ORIGIN)
+    machine = RotaryMachine("turntable", origin_mm=ORIGIN)
     return Points(machine.coordinates(READ), ONE, np.array([1, 2]), ONE, machine, {"c_deg": READ[:, 3]})
 
 
@@ -59,7 +59,7 @@ def test_the_pitch_of_a_carriage_goes_by_what_it_reads_and_what_it_carries() -> 
     """5 ″/m at 110 mm: 2.67 µrad, over the 35 mm that Z reads."""
     points = turned()
     travel = np.array([[0.0, 500.0]] * 3)
-    points = replace(points, machine=Turntable("turntable", travel_mm=travel, origin_mm=ORIGIN))
+    points = replace(points, machine=RotaryMachine("turntable", travel_mm=travel, origin_mm=ORIGIN))
     pitch = ROTATION["x", "y"].basis(points)[:, 0, 0] * 5
     np.testing.assert_allclose(pitch, [5 * np.pi / 180 / 3600 * 0.110 * 35.0] * 2, rtol=1e-12)
 

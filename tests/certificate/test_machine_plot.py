@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from cmm_uq.base.arm import Arm
 from cmm_uq.base.points import Floats, Machine
-from cmm_uq.base.rotary import Turntable
+from cmm_uq.base.rotary import RotaryAxis, RotaryMachine
 from cmm_uq.certificate.plots import machine as pictures
 from cmm_uq.certificate.plots.machine import machine_plot, machine_section, poses_plot
 
@@ -36,7 +36,7 @@ CHAINS = {
             ["Frame", "Carriage X: 0 to 700 mm", "Carriage Y: 0 to 1000 mm", "Carriage Z: −600 to 0 mm", "Probe"]),
     "YXZ": (Machine("m", "YXZ"), ["Frame", "Workpiece"],
             ["Frame", *(f"Carriage {axis}: travel not stated" for axis in "YXZ"), "Probe"]),
-    "YXFZ|C": (Turntable("m", "YXFZ", TRAVEL, travel_deg=np.array([0.0, 360.0])),
+    "YXFZ|C": (RotaryMachine("m", "YXFZ", TRAVEL, rotary=(RotaryAxis("c", travel_deg=np.array([0.0, 360.0])),)),
                ["Frame", "Carriage X: 0 to 700 mm", "Carriage Y: 0 to 1000 mm", "Table C: 0 to 360 °", "Workpiece"],
                ["Frame", "Carriage Z: −600 to 0 mm", "Probe"]),
 }  # fmt: skip
@@ -75,7 +75,7 @@ def test_the_arrow_of_a_table_goes_as_its_reading_grows(
 ) -> None:
     """By where the machine has a point of the table as it turns."""
     at = np.array([350.0, 400.0, -500.0])
-    table = Turntable("m", "XYZ", TRAVEL, letter=letter, axis_mm=at, clockwise=clockwise)
+    table = RotaryMachine("m", "XYZ", TRAVEL, rotary=(RotaryAxis(letter, at, clockwise=clockwise),))
     arc, _, axis = turns_drawn(table, monkeypatch)[letter.upper()]
     start = at + 1.3 * 0.16 * 1000.0 * np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     angles = np.degrees(pictures._ARC)
@@ -96,7 +96,7 @@ def test_the_arrow_of_a_joint_goes_as_its_reading_grows(monkeypatch: pytest.Monk
 
 def test_only_machines_of_more_than_three_straight_axes_have_a_section() -> None:
     assert machine_section(Machine("m", "XYZ", TRAVEL)) is None
-    for machine in (ARM, Turntable("m", "XYZ")):
+    for machine in (ARM, RotaryMachine("m", "XYZ")):
         section = machine_section(machine)
         assert section is not None
         assert str(section.title) == "The machine"

@@ -17,7 +17,7 @@ from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, Clause, State
 from cmm_uq.analysis.conformity.uncertainty import REPEAT_LINES, u_of_repeats
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Points
-from cmm_uq.base.rotary import Turntable
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model.artefact import Artefact
 
@@ -55,7 +55,7 @@ def conditions(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
         positions=POSITIONS,
         turn=TURN_DEG,
     )
-    if not isinstance(machine, Turntable) or machine.column not in points.columns:
+    if not isinstance(machine, RotaryMachine) or machine.fourth is None or machine.fourth.column not in points.columns:
         return (Condition(what, (what,)),)
     lacks = [
         text
@@ -65,15 +65,16 @@ def conditions(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     return (Condition(what, tuple(lacks)),)
 
 
-def _lacking(points: Points, machine: Turntable, number: int, *, recorded: bool) -> Iterator[Text]:
+def _lacking(points: Points, machine: RotaryMachine, number: int, *, recorded: bool) -> Iterator[Text]:
     spheres = [points.select(points.point == point) for point in (1, 2)]
     if min(map(len, spheres)) == 0:
         yield say("measurement {number}: spheres A and B", number=number)
         return
-    whole = machine.travel_deg[1] - machine.travel_deg[0]
+    axis = machine.fourth or machine.rotary[0]
+    whole = axis.travel_deg[1] - axis.travel_deg[0]
     far = TURN_DEG if np.isnan(whole) else min(TURN_DEG, float(whole))
     for name, sphere in zip("AB", spheres, strict=True):
-        read = sphere.columns[machine.column][np.argsort(sphere.repeat, kind="stable")]
+        read = sphere.columns[axis.column][np.argsort(sphere.repeat, kind="stable")]
         steps = np.diff(read)
         senses = [int(np.sum(sense * steps > _SAME)) for sense in (1, -1)]
         if min(senses) < POSITIONS or np.ptp(read) < far - _SAME or abs(read[0] - read[-1]) > _SAME:
@@ -83,14 +84,14 @@ def _lacking(points: Points, machine: Turntable, number: int, *, recorded: bool)
             )  # fmt: skip
         if recorded and len(np.unique(sphere.xyz, axis=0)) < len(sphere):
             yield say("measurement {number}: centres that repeat another to the last digit", number=number)
-    low, high = (sphere.xyz.mean(axis=0) - machine.pivot for sphere in spheres)
-    across = [i for i in range(3) if i != machine.about]
+    low, high = (sphere.xyz.mean(axis=0) - machine.pivot(axis) for sphere in spheres)
+    across = [i for i in range(3) if i != axis.about]
     a, b = low[across], high[across]
     radii = float(np.hypot(*a)), float(np.hypot(*b))
     turn = np.degrees(np.arccos(np.clip(-a @ b / (radii[0] * radii[1]), -1, 1)))
     if abs(radii[0] - radii[1]) > _ALIKE * max(radii) or turn > _OPPOSITE:
         yield say("measurement {number}: spheres at the same radius on opposite sides of the axis", number=number)
-    if abs(low[machine.about] - high[machine.about]) < _ALIKE * max(radii):
+    if abs(low[axis.about] - high[axis.about]) < _ALIKE * max(radii):
         yield say("measurement {number}: spheres at different heights", number=number)
 
 

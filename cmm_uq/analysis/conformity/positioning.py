@@ -51,7 +51,8 @@ def uncertainty_of_figures(runs: PositioningRuns, under: Circumstances) -> dict[
     if whole == 0 and repeat == 0 and not (motion and motion.u_delay):
         return {}
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
-    common = whole * random.standard_normal((_DRAWS, 1, 1, 1)) * growth[None, None, :, None]
+    targets = len(growth) if runs.by_target else 1
+    common = whole * random.standard_normal((_DRAWS, 1, targets, 1)) * growth[None, None, :, None]
     shape = (_DRAWS, *runs.x.shape)
     tails = isinstance(runs, CircularTest)
     each = np.sqrt((_DOF - 2) / _DOF) * random.standard_t(_DOF, shape) if tails else random.standard_normal(shape)

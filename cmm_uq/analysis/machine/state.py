@@ -26,7 +26,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model.field import ALLOWED, PERIODIC, PLAY, bounded, curves, family_of
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
-from cmm_uq.machine.physics.effects.rotary import OfTable
+from cmm_uq.machine.physics.effects.rotary import OfRotary
 from cmm_uq.maths.inference.family_sizes import FieldSizes
 
 POWER_QUANTILE = 1.6449  # of a normal error one in ten, in size, is larger than so many standard deviations
@@ -235,7 +235,7 @@ def unmodelled_errors(modelled: Iterable[str], detected: Mapping[str, float | No
     """
     known, found = set(modelled), []
     for effect in every().values():
-        if effect.name in known or effect.tier != CONTRACT or not of_machine(effect) or isinstance(effect, OfTable):
+        if effect.name in known or effect.tier != CONTRACT or not of_machine(effect) or isinstance(effect, OfRotary):
             continue  # of three straight axes
         if any(column.startswith(_SURROUNDINGS) for column in effect.columns):
             continue

@@ -355,7 +355,7 @@ class Setting:
         named, where, columns = {effect.name for effect in self.named}, "job.toml [plan] rivals", points.columns
         if self.plan.rivals is None:
             free = [e for e in every().values() if e.tier == CONTRACT and e.name not in named and not e.shape]
-            return tuple(e for e in free if all(column in columns for column in e.columns))
+            return tuple(e for e in free if all(c in columns for c in e.columns) and e.unfit(points) is None)
         artefact = self.observed(points)
         chosen = tuple(artefact.acting(effect) for effect in effects(self.plan.rivals, where=where))
         for effect in chosen:

@@ -22,6 +22,7 @@ from cmm_uq.artefacts.axis_runs.run import (
     ALONG,
     CIRCLE,
     END,
+    FACE,
     READINGS,
     START,
     TARGET,
@@ -29,6 +30,7 @@ from cmm_uq.artefacts.axis_runs.run import (
     ZERO,
     Run,
     circle_axes,
+    faces_of,
     kinds_of,
     profiles,
     reference_shape,
@@ -38,10 +40,12 @@ from cmm_uq.artefacts.axis_runs.run import (
     scatter,
     senses_of,
     squares,
+    tables_of,
 )
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size, without_uncertainty
 from cmm_uq.machine.model.recorded import expansion, refuse
@@ -76,7 +80,8 @@ class AxisRuns(Artefact):
         self.rows = np.flatnonzero(~end)[:, None]
         own = points.select(~end)
         self.runs = runs_of(own, where)
-        self._zeros = self._zeros_of(own)
+        self._zeros, self._own = self._zeros_of(own), own
+        self._polygon = tuple(run for run in self.runs if run.table and FACE in own.columns)
         self._kind = kinds_of(self.runs, len(own))
         self._turned, self._ends = np.flatnonzero(self._kind == TURNING), self._ends[self._kind == TURNING]
         self._sense, _ = senses_of(self.runs, len(own))
@@ -99,7 +104,11 @@ class AxisRuns(Artefact):
         self.readings = self._base - self._seen(points.xyz[:, :, None])[:, 0]
         zero = own.columns[ZERO] - self._zeros.means(self.readings)
         self.readings += np.where(free[:, 0] > 0, zero, 0.0)
-        self._profile = reversed_profile(own, self.runs, self.readings, where)
+        self._profile, self._u_faces = reversed_profile(own, self.runs, self.readings, where), np.zeros(len(own))
+        if self._polygon:
+            read, certified = self.readings / self._factor(turns=True), facts.u_polygon_arcsec is not None
+            faces, self._u_faces = faces_of(own, self._polygon, read, certified=certified)
+            self._profile += self._factor(turns=True) * faces
         spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
         self._length: tuple[Size, ...] = ()
         if spans:
@@ -116,7 +125,7 @@ class AxisRuns(Artefact):
     def _with_ends(self, points: Points, where: str | None) -> Points:
         n, runs = len(points), runs_of(points, where)
         kind, (sense, arm) = kinds_of(runs, n), senses_of(runs, n)
-        turning = kind == TURNING
+        turning, table = kind == TURNING, tables_of(runs, n, where)
         turned, (target, start) = np.flatnonzero(turning), np.zeros((2, n))
         for run in runs:
             target[run.rows], start[run.rows] = run.positions, run.radius or run.start
@@ -139,13 +148,14 @@ class AxisRuns(Artefact):
         shift = (readings - zero)[:, None] * sense
         optics = zip(AXES, self._facts.optics_mm, strict=True)
         given = np.column_stack([points.columns.get(f"tip_{a}_mm", np.full(n, at)) for a, at in optics])
-        tip = np.vstack([given, (given + self._facts.arm_mm * arm)[turned]])
+        along = self._facts.arm_mm * arm
+        tip = np.vstack([given, (given + (1 - table[:, None]) * along)[turned]])
         whole = points.select(np.concatenate([np.arange(n), turned]))
         xyz = whole.xyz.copy()
         xyz[:n][~turning] -= shift[~turning]
-        xyz[n:] -= shift[turned]
+        xyz[n:] += (table[:, None] * along - shift)[turned]
         read = np.where(turning[:, None], 0.0, sense)
-        about = np.where(turning[:, None], np.cross(arm, sense), 0.0)
+        about = np.where(turning[:, None], (1 - 2 * table[:, None]) * np.cross(arm, sense), 0.0)
         more = {name: np.append(each, each[turned]) for name, each in ((TARGET, target), (START, start), (ZERO, zero))}
         more |= {END: (np.arange(len(whole)) >= n).astype(np.float64)}
         for names, values in ((READ, read), (TURN, about)):
@@ -153,6 +163,8 @@ class AxisRuns(Artefact):
         more |= {f"tip_{a}_mm": tip[:, i] for i, a in enumerate(AXES)}
         columns = {name: values for name, values in whole.columns.items() if name not in READINGS.values()}
         machine = replace(points.machine, tip_on_every_carriage=True)
+        if isinstance(machine, RotaryMachine):
+            machine = replace(machine, still=bool(table.any()))
         return replace(whole, xyz=xyz, machine=machine, columns={**columns, **more})
 
     def _zeros_of(self, points: Points) -> Placings:
@@ -200,9 +212,10 @@ class AxisRuns(Artefact):
         if facts.u_bar_um is not None and circles.any():
             title = say("Length of the ballbar less its certified one")
             yield Size("bar_um", title, unit("µm"), 0.0, facts.u_bar_um, role="set-up"), circles
+        yield from self._faces()
         for run in self.runs:
             stated = {ACROSS: facts.u_straightness_um, TURNING: facts.u_rotation_arcsec}.get(run.kind)
-            if stated is None or edge[run.rows].any():
+            if stated is None or edge[run.rows].any() or run in self._polygon:
                 continue
             shape, turns = np.zeros(len(square)), run.kind == TURNING
             shape[run.rows] = self._factor(turns=turns) * reference_shape(run, run.positions)
@@ -210,13 +223,26 @@ class AxisRuns(Artefact):
             name = f"reference_{run.measurement}_{'arcsec' if turns else 'um'}"
             yield Size(name, title, unit("″" if turns else "µm"), 0.0, stated, role="set-up"), shape
 
+    def _faces(self) -> Iterator[tuple[Size, Floats]]:
+        """Deviations of a polygon's faces from that of the first, as certified or free."""
+        rows = np.concatenate([run.rows for run in self._polygon]) if self._polygon else np.zeros(0, dtype=np.int64)
+        face, u = self._own.columns.get(FACE, np.zeros(0)), self._facts.u_polygon_arcsec
+        for number in np.unique(face[rows])[1:].tolist() if len(rows) else ():
+            own = np.zeros(len(self._own))
+            own[rows[face[rows] == number]] = self._factor(turns=True)
+            known = self._profile[np.argmax(own > 0)] / self._factor(turns=True) if u is not None else 0.0
+            title = say("Face {number} less the first", number=int(number))
+            sd = np.inf if u is None else u
+            yield Size(f"face_{number:g}_arcsec", title, unit("″"), known, sd, role="set-up"), own
+
     def _taken_as_exact(self, edge: Any) -> Iterator[tuple[Text, NDArray[np.bool_]]]:
         """References of kinds of reading, each but a straightedge turned over, of which the job states no uncertainty."""
         for kind, stated, title in (
             (ACROSS, self._facts.u_straightness_um, say("The reference of straightnesses")),
             (TURNING, self._facts.u_rotation_arcsec, say("The reference of rotations")),
         ):
-            if stated is None and any(run.kind == kind and not edge[run.rows].any() for run in self.runs):
+            plain = [run for run in self.runs if run not in self._polygon]
+            if stated is None and any(run.kind == kind and not edge[run.rows].any() for run in plain):
                 yield without_uncertainty(title), self._kind == kind
 
     def _noise_scale(self) -> Floats:
@@ -295,6 +321,8 @@ class AxisRuns(Artefact):
         readings = (self.readings - self._profile)[run.rows] / self._factor(turns=run.kind == TURNING)
         if run.kind == ALONG:
             readings = readings * np.sign(run.sense @ run.travel)
+        if run.table:  # as the table's own reading grows
+            readings = readings * (run.sense @ run.travel) * self._reads(run.table)
         at, repeat = run.positions + run.start, self.repeat[run.rows]
         read = at, run.directions, repeat, readings
         targets, straight = self._targets(run), run.kind == ACROSS
@@ -313,8 +341,20 @@ class AxisRuns(Artefact):
             known, arrows = self._facts.u_bar_um, found.arrows.replace("↑", "↺").replace("↓", "↻")
             of_bar = CircularTest(found.targets, found.x, arrows, calibrated=known is not None)
             return replace(of_bar, u_reference=known or 0.0, growth=growth, length_mm=run.radius)
+        if run in self._polygon:
+            u = self._facts.u_polygon_arcsec
+            u = float(np.sqrt(np.mean(self._u_faces[run.rows] ** 2))) if u is None else u
+            return replace(found, u_reference=u, growth=np.ones(len(found.targets)), by_target=True)
         own = [size for size in self.sizes if size.name.startswith(f"reference_{run.measurement}_")]
         return replace(found, u_reference=own[0].sd if own else 0.0, growth=growth)
+
+    def _reads(self, letter: str) -> float:
+        """Whether a table's reading grows by the right hand: 1, or −1."""
+        machine = self.points.machine
+        clockwise = isinstance(machine, RotaryMachine) and any(
+            t.clockwise for t in machine.tables if t.letter == letter
+        )
+        return -1.0 if clockwise else 1.0
 
     def _targets(self, run: Run) -> Floats:
         """At which readings of a run that were taken in motion are evaluated; none of one at rest."""

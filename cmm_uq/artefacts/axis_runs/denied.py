@@ -90,7 +90,7 @@ def read_otherwise(points: Points, runs: tuple[Run, ...], readings: Floats) -> t
     against = np.any([points.columns.get(name, np.zeros(len(points))) != 0 for name in (STRAIGHTEDGE, SQUARE)], axis=0)
     first: dict[tuple[float, ...], tuple[Run, dict[tuple[float, float], float]]] = {}
     for run in runs:
-        if run.kind == CIRCLE or against[run.rows].any():
+        if run.kind == CIRCLE or run.table or against[run.rows].any():
             continue
         beside = points.xyz[run.rows[0]] - (points.xyz[run.rows[0]] @ run.travel) * run.travel
         line = np.concatenate([run.travel, run.sense, beside, vectors(points, names)[run.rows[0]]])

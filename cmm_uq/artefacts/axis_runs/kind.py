@@ -68,6 +68,9 @@ class AxisRunsFacts(InterferometerFacts):
     that was not reversed."""
     u_rotation_arcsec: Uncertainty | None = None
     """Standard uncertainty of a rotation at the end of a run against its beginning: angular optics, level, autocollimator."""
+    u_polygon_arcsec: Uncertainty | None = None
+    """Standard uncertainty of the certified angle of each face of a polygon, or of an index table, that a rotary table is read
+    against; without it the faces are found by closure, from several settings of the polygon on the table."""
     u_bar_um: Uncertainty | None = None
     """Standard uncertainty of the calibrated length of a telescoping ballbar that reads along circles; without it their
     radius stays free."""
@@ -111,6 +114,8 @@ AXIS_RUNS = Kind(
         further={
             **dict.fromkeys((*APPROACHES, *(f"tip_{a}_mm" for a in AXES)), ""),
             "straightedge": "+1 against a straightedge as it lies first, −1 against it turned over, 0 without one.",
+            "face": "Number of the polygon's face that is read, where a rotary table turns.",
+            "face_arcsec": "Certified deviation of that face's angle, by the right hand as it stands on the table.",
             "square": "Number of the setting of a square, the same along both of its legs; 0 without one.",
         },
     ),

@@ -76,7 +76,7 @@ def results(result: Result) -> dict[str, Any]:
             for m, s in zip(found.mean, found.s, strict=True)
         ]
         told |= {
-            "angles_deg" if run.kind == CIRCLE else "targets_mm": found.targets.tolist(),
+            "angles_deg" if run.kind == CIRCLE or run.table else "targets_mm": found.targets.tolist(),
             "directions": by_way,
             "reversal": found.reversal.tolist(),
             "figures": dict(found.figures()),
@@ -235,13 +235,16 @@ def _targets(run: Run, found: PositioningRuns) -> Iterator[Block]:
         )
         for i, target in enumerate(found.targets)
     )
-    columns_of = (Column(say("Target"), unit("mm")), *figure_columns(*(head for head, _ in shown), unit=own))
+    columns_of = (
+        Column(say("Target"), unit("°" if run.table else "mm")),
+        *figure_columns(*(head for head, _ in shown), unit=own),
+    )
     if found.repeats == 1:
         yield Table(title, columns_of, rows)
         return
     means = say("{title}: means of {repeats} repeats, filled in the positive direction, with ±2s.",
                 title=title, repeats=found.repeats)  # fmt: skip
-    yield picture(label=say("Target / mm"), caption=means)
+    yield picture(label=say("Angle / °") if run.table else say("Target / mm"), caption=means)
     drift = number(float(np.abs(found.drift).max()), ".2g")
     drifts = say("The mean of a repeat differs from that of all by up to {drift} {unit}.", drift=drift, unit=own)
     yield Table(title, columns_of, rows, (drifts,))

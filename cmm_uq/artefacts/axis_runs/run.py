@@ -15,6 +15,7 @@ from cmm_uq.artefacts.axis_runs.kind import APPROACHES, READ, TURN
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import METRE
 from cmm_uq.machine.model.recorded import refuse
 
@@ -23,6 +24,7 @@ READINGS = {False: "reading_um", True: "reading_arcsec"}  # by whether a rotatio
 # columns of the artefact's own points: whether one is the other end of an arm; the target along the run from its first, or
 # outward on a circle, and where that is, or the circle's radius; the mean of the readings of one zero; mm
 END, TARGET, START, ZERO = "_arm_end", "_target_mm", "_start_mm", "_zero_mm"
+FACE, FACE_ANGLE = "face", "face_arcsec"  # columns: number of a polygon's face, and its certified deviation
 STRAIGHTEDGE, SQUARE = "straightedge", "square"  # columns: +1, and −1 reversed; number of the setting
 _UNIT, _SAME_MM = 0.01, 1e-6
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
@@ -44,18 +46,25 @@ class Run:
     positions: Floats  # (k,) of the targets along the travel, from the first, mm; angles on a circle, degrees
     directions: Floats  # (k,) −1 or +1, in which each position was approached; 0 where nobody says
     radius: float = 0.0  # of a circle, mm
+    # letter of the rotary table that turned, where that is read: the carriages stand still, and positions are in degrees
+    table: str = ""
 
     @property
     def axis(self) -> str:
         """The carriage that moves; empty where several do."""
-        if self.kind == CIRCLE:
+        if self.kind == CIRCLE or self.table:
             return ""
         moved = np.flatnonzero(np.abs(self.travel) > _ALONG)
         return AXES[moved[0]] if len(moved) else ""
 
     @property
     def quantity(self) -> Text:
-        """Name in VDI/VDE 2617 of the parametric error that it shows, as ``xtx``; its direction where it shows several."""
+        """Name in VDI/VDE 2617 of the parametric error that it shows, as ``xtx``; its direction where it shows several.
+
+        Of a rotary table the name by ISO 230-7, ``ECC``.
+        """
+        if self.table:
+            return Verbatim(f"E{2 * self.table.upper()}")
         if self.kind == CIRCLE:
             about = np.flatnonzero(np.abs(self.travel) > _ALONG)
             return say("circle {plane}", plane=Verbatim(("YZ", "ZX", "XY")[about[0]] if len(about) else "–"))
@@ -199,6 +208,17 @@ def kinds_of(runs: tuple[Run, ...], count: int) -> NDArray[Any]:
     return found
 
 
+def tables_of(runs: tuple[Run, ...], count: int, where: str | None) -> Floats:
+    """(n,) 1 where a rotary table is read, else 0; both in one recording are refused."""
+    found = np.zeros(count)
+    for run in runs:
+        found[run.rows] = float(bool(run.table))
+    if np.ptp(found) > 0:
+        fix = "Record those of the table as a job of their own"
+        raise CmmUqError("runs of carriages beside runs of a rotary table", where=where or "recording", fix=fix)
+    return found
+
+
 def senses_of(runs: tuple[Run, ...], count: int) -> tuple[Floats, Floats]:
     """(n, 3) along which each reading sees displacements, and (n, 3) the way along its arm, zero without one."""
     sense, arm = np.zeros((count, 3)), np.zeros((count, 3))
@@ -207,6 +227,8 @@ def senses_of(runs: tuple[Run, ...], count: int) -> tuple[Floats, Floats]:
         if run.kind == TURNING:
             arm[run.rows] = _arm(run)
             sense[run.rows] = np.cross(run.sense, _arm(run))
+            if run.table:  # what stands on a table goes against its error as coordinates on it show that
+                sense[run.rows] *= -1
     return sense, arm
 
 
@@ -262,6 +284,8 @@ def _run(points: Points, number: int, rows: Ints, where: str | None) -> Run:
     def check(wrong: bool | NDArray[np.bool_], problem: str, fix: str) -> None:
         refuse(points, own & wrong, where, problem, fix)
 
+    if (turned := _of_table(points, number, rows)) is not None:
+        return turned
     travel = xyz[int(np.argmax(np.linalg.norm(xyz - xyz[0], axis=1)))] - xyz[0]
     length = float(np.linalg.norm(travel))
     still = f"{whose} stands still: all its positions are one"
@@ -302,3 +326,49 @@ def _run(points: Points, number: int, rows: Ints, where: str | None) -> Run:
     check(kind == ACROSS and targets < 3, few, "Record more positions, or leave it out")
     directions = np.sign(np.round(vectors(points, APPROACHES)[rows] @ travel, 9))
     return Run(number, kind, rows, travel, sense, start, positions, directions)
+
+
+def _of_table(points: Points, number: int, rows: Ints) -> Run | None:
+    """A run of a rotary table, read about its axis while the carriages stand still; ``None`` where it is none."""
+    machine, turn = points.machine, vectors(points, TURN)[rows]
+    tables = machine.tables if isinstance(machine, RotaryMachine) else ()
+    for table in tables if np.ptp(points.xyz[rows], axis=0).max() < _SAME_MM else ():
+        about, zero = np.eye(3)[table.about], np.zeros(len(points))
+        read = points.columns.get(table.column, zero)[rows]
+        if np.ptp(read) > 0 and np.abs(np.abs(turn @ about) - 1).max() < _UNIT:
+            sense = np.sign(turn[0] @ about) * about
+            ways = np.sign(points.columns.get(f"{table.letter}_approach", zero)[rows])
+            at = read - read.min()
+            return Run(number, TURNING, rows, about, sense, float(read.min()), at, ways, table=table.letter)
+    return None
+
+
+def faces_of(points: Points, runs: tuple[Run, ...], readings: Floats, *, certified: bool) -> tuple[Floats, Floats]:
+    """(n,) what of readings (n,), ″, is the polygon's, by its certificate or by closure; and u of it, by closure alone.
+
+    Of several settings of a polygon on the table each reading is the sum of what the table errs there, of its face's deviation
+    from that of the first, and of a zero of the setting: least squares part them.
+    """
+    n, rows = len(points), np.concatenate([run.rows for run in runs])
+    face = points.columns[FACE]
+    if certified:
+        known = points.columns.get(FACE_ANGLE, np.zeros(n))
+        return np.where(np.isin(np.arange(n), rows), known - known[rows][np.argmin(face[rows])], 0.0), np.zeros(n)
+    at, way, setting = np.zeros((3, n))
+    for run in runs:
+        at[run.rows], way[run.rows] = (run.positions + run.start) % 360, run.directions
+        setting[run.rows] = run.measurement
+    numbers, which = np.unique(face[rows], return_inverse=True)
+    blocks = [np.eye(len(numbers))[which.ravel()][:, 1:]]
+    for each in (np.column_stack([np.round(at, 3), way])[rows], setting[rows, None]):
+        index = np.unique(each, axis=0, return_inverse=True)[1].ravel()
+        blocks.append(np.eye(index.max() + 1)[index])
+    design = np.hstack(blocks)
+    inverse = np.linalg.pinv(design, rcond=1e-9)
+    found = inverse @ readings[rows]
+    q, dof = len(numbers) - 1, len(rows) - np.linalg.matrix_rank(design)
+    s = np.sqrt(np.sum((readings[rows] - design @ found) ** 2) / dof) if dof > 0 else 0.0
+    profile, u = np.zeros(n), np.zeros(n)
+    profile[rows] = blocks[0] @ found[:q]
+    u[rows] = s * (blocks[0] @ np.linalg.norm(inverse[:q], axis=1))
+    return profile, u

@@ -1,13 +1,14 @@
-"""Spheres on a turning table, whose centres are free but stay where they are on it: observed, planned, stated.
+"""Spheres on turning tables, or seen by a turning head, whose centres are free but stay where they are: observed, planned.
 
-Each point is the centre of a sphere at one position of the table, numbered by ``repeat``. What the coordinates of a sphere do
-about their mean while the table turns is what the machine and its table err: along the radius, the tangent and the axis.
+Each point is the centre of a sphere at one position of the axes, numbered by ``repeat``. What the coordinates of a sphere do
+about their mean while these turn is what the machine and its rotary axes err: along the radius, the tangent and the axis of
+one that turns alone, else along X, Y and Z.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, cast
+from collections.abc import Mapping, Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,21 +18,18 @@ from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import TableSpheresFacts
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, Verbatim, number, say
+from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
-from cmm_uq.base.rotary import Turntable
-from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Plot, Section, Table, columns, figure_columns
-from cmm_uq.certificate.plots.residuals import deviations_plot
-from cmm_uq.certificate.result import Page, Result
+from cmm_uq.base.rotary import RotaryAxis, RotaryMachine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.maths.inference.linear_model import Freedoms
-from cmm_uq.maths.uncertainty.quantity import rounded
 
 FIGURES = ("FR", "FT", "FA")  # ranges along the radius, the tangent and the axis
-_DIRECTIONS = (say("radial"), say("tangential"), say("axial"))
+RANGES = ("FX", "FY", "FZ")  # where several axes turned, or a sphere lies on the axis: along those of the coordinates
+_STILL = 1e-3  # ° by which an axis that does not turn may seem to
+DIRECTIONS = (say("radial"), say("tangential"), say("axial"))
 _STRAY, _ON_AXIS = 5.0, 1.0  # mm by which no table errs; from the axis within which a sphere has no radius
 _TURN, POSITIONS = 720.0, 7  # degrees out and back, and positions of the table in each sense
 
@@ -45,21 +43,49 @@ class TableSpheres(Artefact):
     def __init__(self, facts: TableSpheresFacts, points: Points, *, where: str | None = None) -> None:
         self.points = points
         self.machine = _turning(points.machine)
-        self.angle = points.columns.get(self.machine.column)
-        if self.angle is None:
-            problem, fix = f"no column {self.machine.column!r}: at which angle of the table each centre lay", "Add it"
+        self.read = {
+            axis.letter: points.columns[axis.column] for axis in self.machine.rotary if axis.column in points.columns
+        }
+        if not self.read:
+            column = self.machine.rotary[0].column
+            problem, fix = f"no column {column!r}: at which angle of the table each centre lay", "Add it"
             raise CmmUqError(problem, where=where or "recording", fix=fix)
-        of = np.column_stack([points.measurement, points.point])
-        each, index = np.unique(of, axis=0, return_inverse=True)
-        self.spheres, self.placings = each, Placings(index.ravel().astype(np.int64), each[:, 0].astype(np.int64))
+        load = np.ones_like(points.measurement) if facts.stay else points.measurement
+        each, index = np.unique(np.column_stack([load, points.point]), axis=0, return_inverse=True)
+        self.placings = Placings(index.ravel().astype(np.int64), each[:, 0].astype(np.int64))
         self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
-        away = self.placings.means(points.xyz) - self.machine.pivot
-        self.axial = away[:, self.machine.about].copy()
-        away[:, self.machine.about] = 0.0
-        self.radius = np.linalg.norm(away, axis=1)
-        self._refuse_no_turn(where)
-        radial, axis = away / self.radius[:, None], np.eye(3)[self.machine.about]
-        self.axes = np.stack([radial, np.cross(axis, radial), np.broadcast_to(axis, radial.shape)], axis=1)
+        whole = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)[1]
+        self.runs = [np.flatnonzero(whole.ravel() == i) for i in range(int(whole.max()) + 1)]  # of one sphere each
+        middle, n = self.placings.means(points.xyz), len(points)
+        self.radius, self.axial, self.by_axis = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool)
+        self.axes = np.tile(np.eye(3), (n, 1, 1))
+        self.turns: dict[int, str] = {}
+        for run in np.unique(points.measurement).tolist():
+            own = np.flatnonzero(points.measurement == run)
+            self.turns[run] = letters = self._turning(own)
+            axis = next(each for each in self.machine.rotary if each.letter == letters) if len(letters) == 1 else None
+            if axis is not None:
+                columns = {name: values[own] for name, values in points.columns.items()}
+                self._along(own, *self.machine.by_turn(axis, middle[own], columns))
+        self._refuse_stray(where)
+        if self.machine.fourth:
+            self._refuse_no_radius(where)
+
+    def _turning(self, rows: NDArray[np.int64]) -> str:
+        """Letters of the axes that turned in these rows, in the order of the chain."""
+        if self.machine.fourth:
+            return self.machine.fourth.letter
+        return "".join(letter for letter, read in self.read.items() if np.ptp(read[rows]) > _STILL)
+
+    def _along(self, rows: NDArray[np.int64], away: Floats, axis: Floats) -> None:
+        """What is observed of these rows lies along the radius, the tangent and the axis of what turned."""
+        axial = np.einsum("ni,ni->n", away, axis)
+        across = away - axial[:, None] * axis
+        radius = np.linalg.norm(across, axis=1)
+        self.radius[rows], self.axial[rows] = radius, axial
+        if self.machine.fourth or radius.min() > _ON_AXIS:
+            radial = across / radius[:, None]
+            self.axes[rows], self.by_axis[rows] = np.stack([radial, np.cross(axis, radial), axis], axis=1), True
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         return self.placings.means(true_xyz)
@@ -74,7 +100,8 @@ class TableSpheres(Artefact):
         return self.placings.unread(self.points.xyz, self.axes.transpose(0, 2, 1)).ravel()
 
     def words_of(self, observation: int) -> Text:
-        what = _DIRECTIONS[observation % 3]
+        i, k = divmod(observation, 3)
+        what = DIRECTIONS[k] if self.by_axis[i] else Verbatim(AXES[k].upper())
         return say("the {direction} coordinate of {what}", direction=what, what=super().words_of(observation))
 
     def deviations(self) -> Floats:
@@ -83,31 +110,39 @@ class TableSpheres(Artefact):
         return np.asarray(np.einsum("nij,nj->ni", self.axes, about))
 
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
-        """Range of each sphere's coordinates over all positions of the table, by direction."""
-        every = [own for rows in self.placings.rows if len(own := rows[counts[rows]]) > 1]
-        if not every:
-            return {}
-        rows = np.array([np.resize(own, len(self.points)) for own in every])
-        names = tuple(sphere_name(int(self.points.point[own[0]])) for own in every)
-        lengths, deviations = self.radius[rows[:, 0]], self.deviations()
-        return {
-            name: ArtefactFigure(np.array([np.ptp(deviations[own, k]) for own in every]), rows, lengths, names=names)
-            for k, name in enumerate(FIGURES)
-        }
+        """Range of each sphere's coordinates over all positions, by direction: of those that one axis turned, or of others."""
+        deviations, found = self.deviations(), dict[str, ArtefactFigure]()
+        for by_axis, figures in ((True, FIGURES), (False, RANGES)):
+            every = [
+                own for rows in self.runs if len(own := rows[counts[rows]]) > 1 and self.by_axis[own[0]] == by_axis
+            ]
+            if not every:
+                continue
+            rows = np.array([np.resize(own, len(self.points)) for own in every])
+            names = tuple(sphere_name(int(self.points.point[own[0]])) for own in every)
+            for k, name in enumerate(figures):
+                values = np.array([np.ptp(deviations[own, k]) for own in every])
+                found[name] = ArtefactFigure(values, rows, np.nan_to_num(self.radius[rows[:, 0]]), names=names)
+        return found
 
-    def _refuse_no_turn(self, where: str | None) -> None:
+    def _refuse_stray(self, where: str | None) -> None:
         points = self.points
         stray = np.linalg.norm(points.xyz - self.placings.means(points.xyz), axis=1)
         if stray.max(initial=0.0) > _STRAY:
             row, other = int(np.argmax(stray)), "table" if self.machine.recorded_in_machine else "machine"
+            fix = f'give coordinates = "{other}", turns or axis_mm in [machine.table]'
+            if not self.machine.fourth:
+                fix = "mend coordinates, turns and axis_mm of the axes in [machine]"
             raise CmmUqError(
                 f"sphere {points.point[row]} does not stay where it is on the table: it goes {stray[row]:.4g} mm away",
                 where=place(points, np.arange(len(points)) == row, where),
-                fix=f'Number the same sphere by the same point, or give coordinates = "{other}", turns or axis_mm in '
-                "[machine.table]",
+                fix=f"Number the same sphere by the same point, or {fix}",
             )
+
+    def _refuse_no_radius(self, where: str | None) -> None:
+        points = self.points
         for load in np.unique(points.measurement).tolist():
-            own = [rows for rows, (m, _) in zip(self.placings.rows, self.spheres.tolist(), strict=True) if m == load]
+            own = [rows for rows in self.runs if points.measurement[rows[0]] == load]
             middles = np.array([points.xyz[rows].mean(axis=0) for rows in own])
             if len(own) > 1 and np.ptp(middles, axis=0).max() < _ON_AXIS:
                 raise CmmUqError(
@@ -123,8 +158,8 @@ class TableSpheres(Artefact):
             )
 
 
-def _turning(machine: Machine) -> Turntable:
-    if isinstance(machine, Turntable):
+def _turning(machine: Machine) -> RotaryMachine:
+    if isinstance(machine, RotaryMachine):
         return machine
     fix = 'Give it in [machine], such as chain = "XYZ|C"'
     raise CmmUqError("the machine has no rotary table in its chain", where="job.toml [machine] chain", fix=fix)
@@ -150,28 +185,35 @@ def _about_median(xyz: Floats, _: Floats, size: float) -> Floats:
 SCREENING = Screening(shape_of, balls=True)
 
 
-def positions(machine: Turntable) -> tuple[Floats, Floats]:
-    """Angles of the table, out from 0 over two turns, or over its travel, and back, °; and the senses of turning."""
-    low, high = np.where(np.isnan(machine.travel_deg), [-np.inf, np.inf], machine.travel_deg)
+def positions(axis: RotaryAxis) -> tuple[Floats, Floats]:
+    """Angles of a table, out from 0 over two turns, or over its travel, and back, °; and the senses of turning."""
+    low, high = np.where(np.isnan(axis.travel_deg), [-np.inf, np.inf], axis.travel_deg)
     far = min(max(_TURN, float(low) + _TURN), float(high))
     start = max(far - _TURN, float(low))
     out = np.linspace(start, far, POSITIONS + 1)
     return np.concatenate([out, out[-2::-1]]), np.repeat([0.0, 1.0, -1.0], [1, POSITIONS, POSITIONS])
 
 
-def two_spheres(setting: Setting, *, radius: float = 1.0, height: float = 1.0, turn: float = 0.0) -> SetUp:
-    """A low and a high sphere on opposite sides of the axis, by parts of the radius and height of the job."""
+def _pair(setting: Setting, axis: RotaryAxis, radius: float, height: float, turn: float) -> Floats:
+    """(2, 3) a low and a high sphere on opposite sides of an axis, by parts of the radius and height of the job."""
     machine, facts = _turning(setting.machine), cast("TableSpheresFacts", setting.artefact)
-    angles, senses = (np.tile(each, setting.plan.repeats) for each in positions(machine))
-    about = machine.about
+    about, pivot = axis.about, machine.pivot(axis)
     out = np.roll(np.array([0.0, np.cos(turn), np.sin(turn)]), about) * facts.radius_mm * radius
-    low = machine.pivot + np.eye(3)[about] * facts.low_mm
-    pair = np.array([low + out, low - out + np.eye(3)[about] * facts.height_mm * height])
-    n = len(angles)
-    columns = {machine.column: np.repeat(angles, 2), f"{machine.letter}_approach": np.repeat(senses, 2)}
-    ones, visit = np.ones(2 * n, dtype=np.int64), np.repeat(np.arange(1, n + 1), 2)
-    points = Points(np.tile(pair, (n, 1)), ones, np.tile([1, 2], n), visit, machine, columns)
-    box, there = setting.volume.box, points.machine_xyz
+    low = pivot + np.eye(3)[about] * facts.low_mm
+    return np.array([low + out, low - out + np.eye(3)[about] * facts.height_mm * height])
+
+
+def _at_positions(setting: Setting, spheres: Floats, columns: Mapping[str, Floats]) -> Points:
+    """Each sphere (k, 3) at each position, ``columns`` (n,) by position; refused where the carriages cannot go there."""
+    n, k, machine = len(next(iter(columns.values()))), len(spheres), _turning(setting.machine)
+    whole = {name: np.repeat(values, k) for name, values in columns.items()}
+    if machine.head:
+        whole |= {
+            f"tip_{a}_mm": tip for a, tip in zip(AXES, np.broadcast_to(machine.tip(whole), (n * k, 3)).T, strict=True)
+        }
+    ones, visit = np.ones(k * n, dtype=np.int64), np.repeat(np.arange(1, n + 1), k)
+    points = Points(np.tile(spheres, (n, 1)), ones, np.tile(np.arange(1, k + 1), n), visit, machine, whole)
+    box, there = setting.volume.box, points.carriages
     if np.any(beyond := (there < box[:, 0] - 1e-6) | (there > box[:, 1] + 1e-6)):
         axis = AXES[int(np.argmax(beyond.any(axis=0)))]
         raise CmmUqError(
@@ -179,6 +221,18 @@ def two_spheres(setting: Setting, *, radius: float = 1.0, height: float = 1.0, t
             where="job.toml [plan]",
             fix="Make radius_mm or height_mm smaller, or mend axis_mm or low_mm",
         )
+    return points
+
+
+def two_spheres(setting: Setting, *, radius: float = 1.0, height: float = 1.0, turn: float = 0.0) -> SetUp:
+    """A low and a high sphere at the positions of ISO 10360-3."""
+    facts, axis = cast("TableSpheresFacts", setting.artefact), _turning(setting.machine).fourth
+    if axis is None:
+        fix = 'Ask for ready = "runs" of each axis, in [plan]'
+        raise CmmUqError("ISO 10360-3 is of one rotary table alone", where="job.toml [plan]", fix=fix)
+    angles, senses = (np.tile(each, setting.plan.repeats) for each in positions(axis))
+    columns = {axis.column: angles, f"{axis.letter}_approach": senses}
+    points = _at_positions(setting, _pair(setting, axis, radius, height, turn), columns)
     title = say(
         "radius {radius:.0f} mm, height difference {height:.0f} mm, at {turn:.0f}°",
         radius=facts.radius_mm * radius,
@@ -191,60 +245,64 @@ def two_spheres(setting: Setting, *, radius: float = 1.0, height: float = 1.0, t
 def _candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
     """The spheres farther in, lower, and a quarter of a turn on."""
     parts = [(r, h, turn) for r in (1.0, 0.5) for h in (1.0, 0.5) for turn in (0.0, 0.5 * np.pi)]
+    if _turning(setting.machine).fourth is None:
+        return tuple(one for r, h, turn in parts for one in runs(setting, radius=r, height=h, turn=turn))
     return tuple(two_spheres(setting, radius=r, height=h, turn=turn) for r, h, turn in parts)
 
 
-PLANNING = Planning({"ISO 10360-3": lambda setting: (two_spheres(setting),)}, _candidates)
+def runs(setting: Setting, *, radius: float = 1.0, height: float = 1.0, turn: float = 0.0) -> tuple[SetUp, ...]:
+    """Each axis there and back over a turn, or its travel, while each other stands low and high; then all at once.
+
+    Two spheres on the last table; one in the middle of the volume where nothing but the probe turns.
+    """
+    machine, found = _turning(setting.machine), list[SetUp]()
+    spheres = setting.volume.box.mean(axis=1)[None] - machine.origin_mm
+    if machine.tables:
+        spheres = _pair(setting, machine.tables[-1], radius, height, turn)
+    out = {axis.letter: np.linspace(*_range(axis), STEPS + 1) for axis in machine.rotary}
+    for axis in machine.rotary:
+        others = [other for other in machine.rotary if other is not axis]
+        for part in _STANDS if others else _STANDS[:1]:
+            stands = {other.letter: float(np.quantile(out[other.letter], part)) for other in others}
+            found.append(_run(setting, spheres, (axis,), out, stands))
+    if len(machine.rotary) > 1:
+        found.append(_run(setting, spheres, machine.rotary, out, {}))
+    return tuple(found)
 
 
-def results(result: Result) -> dict[str, Any]:
-    artefact = cast("TableSpheres", result.artefact)
-    found, points = artefact.figures(np.ones(len(artefact.points), dtype=bool)), artefact.points
-    each = []
-    for i, (first, *_) in enumerate(artefact.placings.rows):
-        one: dict[str, Any] = {"measurement": int(points.measurement[first]), "point": int(points.point[first])}
-        one |= {"radius_mm": float(artefact.radius[first]), "height_mm": float(artefact.axial[first])}
-        each.append(one | {f"{name}_um": float(found[name].values[i]) / MICROMETRE for name in FIGURES})
-    return {"spheres": each}
+STEPS, _STANDS = 12, (0.25, 0.75)  # of a run each way; parts of its travel at which an axis stands meanwhile
 
 
-def sections(result: Result) -> list[Section]:
-    artefact = cast("TableSpheres", result.artefact)
-    plots = [_over_positions(result, artefact, k) for k in range(3)]
-    return [Section(say("Four-axis errors"), (_table(result), *plots))]
+def _range(axis: RotaryAxis) -> tuple[float, float]:
+    """A turn from 0, or the travel where that is less, °."""
+    low, high = np.where(np.isnan(axis.travel_deg), [0.0, 360.0], axis.travel_deg)
+    return float(max(low, min(0.0, high - 360.0))), float(min(high, max(360.0, low)))
 
 
-def _table(result: Result) -> Table:
-    rows = [
-        (
-            say("measurement {number}, {sphere}", number=one["measurement"], sphere=sphere_name(one["point"])),
-            *(number(one[name], ".1f") for name in ("radius_mm", "height_mm")),
-            *(rounded(one[f"{name}_um"], result.noise.expanded / 2)[0] for name in FIGURES),
+def _run(
+    setting: Setting,
+    spheres: Floats,
+    turning: Sequence[RotaryAxis],
+    out: Mapping[str, Floats],
+    stands: Mapping[str, float],
+) -> SetUp:
+    """These axes there and back, those that stand at an angle."""
+    n, columns = (2 * STEPS + 2) * setting.plan.repeats, dict[str, Floats]()
+    for axis in turning:
+        there = out[axis.letter]
+        columns[axis.column] = np.tile(np.concatenate([there, there[::-1]]), setting.plan.repeats)
+        senses = np.repeat([1.0, -1.0], STEPS + 1)
+        columns[f"{axis.letter}_approach"] = np.tile(senses, setting.plan.repeats)
+    for letter, angle in stands.items():
+        columns |= {f"{letter}_deg": np.full(n, angle), f"{letter}_approach": np.zeros(n)}
+    which = commas(Verbatim(axis.letter.upper()) for axis in turning)
+    words = say("{axes} there and back", axes=which)
+    if stands:
+        at = commas(
+            say("{axis} at {angle:g}°", axis=Verbatim(each.upper()), angle=angle) for each, angle in stands.items()
         )
-        for one in results(result)["spheres"]
-    ]
-    places, ranges = figure_columns(say("Radius"), say("Height"), unit=unit("mm")), map(Verbatim, FIGURES)
-    note = say(
-        "Range of the coordinate of the centre on the table over all its positions: along the radius (FR), the tangent (FT) "
-        "and the axis (FA), as recorded. Radius and height are from the stated point of the axis."
-    )
-    heads = columns([say("Sphere"), *places, *figure_columns(*ranges, unit=unit("µm"))])
-    return Table(say("Ranges"), heads, tuple(rows), (note,))
+        words = say("{words}, {at}", words=words, at=at)
+    return SetUp(words, _at_positions(setting, spheres, columns))
 
 
-def _over_positions(result: Result, artefact: TableSpheres, k: int) -> Plot:
-    before, direction = artefact.deviations()[:, k] / MICROMETRE, _DIRECTIONS[k]
-    caption = say(
-        "{direction:capital} coordinate of each centre about the mean of its sphere, with U (k = {k}).",
-        direction=direction,
-        k=number(result.noise.coverage_factor, ".2f"),
-    )
-    return deviations_plot(
-        result, before, say("{count} centres deviate", count=len(before)),
-        say("{direction} from the mean of their sphere", direction=direction), position=artefact.points.repeat,
-        after_um=result.residuals[k::3] / MICROMETRE, flagged=result.flagged[k::3], reference=say("mean of the sphere"),
-        position_label=say("Position of the table, in order"), caption=caption,
-    )  # fmt: skip
-
-
-PAGE = Page(sections, results)
+PLANNING = Planning({"ISO 10360-3": lambda setting: (two_spheres(setting),), "runs": runs}, _candidates)

@@ -12,7 +12,8 @@ from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Position, Triple, Uncertainty, key, required
 from cmm_uq.jobs.part.feature import Name
 from cmm_uq.jobs.tables.length_formula import Permissible
-from cmm_uq.jobs.tables.machine import AxesFacts, FurtherList, Travel, check_carriages
+from cmm_uq.jobs.tables.machine import AxesFacts, FurtherList, Travel
+from cmm_uq.jobs.tables.rotary_axes import check_carriages
 
 Readings = Annotated[list[Position], Field(min_length=6, max_length=6)]
 

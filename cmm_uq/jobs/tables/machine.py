@@ -24,6 +24,7 @@ from cmm_uq.base.files.table import (
     required,
 )
 from cmm_uq.jobs.tables.arm import MOST_JOINTS, ArmFacts, JointFacts
+from cmm_uq.jobs.tables.rotary_axes import HeadFacts, RotaryFacts, RotaryTableFacts, check_carriages, rotary_problems
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -170,35 +171,6 @@ class DigitizerFacts(JobTable):
                 yield f"pose {number} is there twice: number each pose as the cloud does"
 
 
-def check_carriages(chain: str) -> None:
-    """Refuse a chain without each of its three carriages once, or with more behind them than one rotary table."""
-    carriages, bar, tables = chain.partition("|")
-    if sorted(carriages.replace("F", "", 1)) != ["X", "Y", "Z"]:
-        raise ValueError(f"chain = {chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves")
-    if bar and tables not in ("A", "B", "C"):
-        raise ValueError(
-            f"chain = {chain!r}: give one rotary table behind the bar, A, B or C as it turns about X, Y or Z, such as XYZ|C"
-        )
-
-
-class RotaryTableFacts(JobTable):
-    """``table``: the rotary table that a chain such as `XYZ|C` ends with."""
-
-    axis_mm: Triple | None = None
-    """A point on its axis in scale readings; the origin of the recording where left out. Location and tilt of the axis are
-    those at this point."""
-    coordinates: Literal["table", "machine"] = "table"
-    """Whether recorded coordinates are turned back by the table's angle, so that what stands on it keeps them, or are those of
-    the carriages."""
-    turns: Literal["anticlockwise", "clockwise"] = "anticlockwise"
-    """How the table turns while its reading grows, seen from the positive end of the axis that it is parallel to."""
-    travel_deg: Range | None = key(None, "Lowest and highest reading of the table.")
-
-    def problems(self) -> Iterator[str]:
-        if self.coordinates == "machine" and self.axis_mm is None:
-            yield 'coordinates = "machine" are turned back about the table\'s axis: give a point of it, axis_mm = [x, y, z]'
-
-
 Reading = Literal[
     "exposed optical grating", "sealed optical grating", "laser interferometer", "inductive scale", "magnetic scale",
     "rack and rotary encoder", "ball screw and rotary encoder", "unknown",
@@ -276,10 +248,15 @@ class MachineFacts(JobTable):
     model: str = key("", "Model or type of the machine.")
     serial: str = key("", "Serial number of the machine (7.8.2.1 g).")
     owner: str = key("", "Owner of the machine.")
-    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}(\|[A-Z]*)?$")] = "XYZ"
-    """Carriages from the table to the ram, with F for the frame where the workpiece moves; behind a bar the rotary table that
-    it stands on, such as `XYZ|C`."""
+    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}(-[A-Z]*)?(\|[A-Z]*)?$")] = "XYZ"
+    """Carriages from the table to the ram, with F for the frame where the workpiece moves; behind a hyphen the rotary axes of
+    a head, from the ram to the probe, such as `XYZ-CA`; behind a bar the rotary tables that the workpiece stands on, from
+    the bed, such as `XYZ|C`, or `XYZ|AC` with C on A."""
     table: RotaryTableFacts = key(RotaryTableFacts(), "The rotary table of the chain.")
+    rotary: Annotated[list[RotaryFacts], Field(max_length=3)] = key(
+        [], "The rotary axes of a chain with several, or with a head."
+    )
+    head: HeadFacts = key(HeadFacts(), "The head that turns the probe.")
     joint: Annotated[list[JointFacts], Field(max_length=MOST_JOINTS)] = []
     """Joints of an arm, or of a robot, from the base to the flange, in place of carriages."""
     arm: ArmFacts = key(ArmFacts(), "What holds for all joints, and the tool.")
@@ -302,8 +279,7 @@ class MachineFacts(JobTable):
         for file in [each.file for each in self.error_map if each.squareness_arcsec and self.squareness_arcsec]:
             yield f"squareness_arcsec is given for the machine and for the map {file!r}: leave out one of the two"
         check_carriages(self.chain)
-        if self.table.model_fields_set and "|" not in self.chain:
-            yield f"[machine.table] is of a rotary table, which chain = {self.chain!r} has not: give it behind a bar, as XYZ|C"
+        yield from rotary_problems(self.chain, self.rotary, self.table, self.head)
         if self.joint and (wrong := sorted(self.model_fields_set - _OF_ARMS)):
             yield f"{wrong[0]} is of a machine of carriages, and [[machine.joint]] of an arm: leave one of them out"
         screws = [number for number, joint in enumerate(self.joint, 1) if joint.direction is not None]

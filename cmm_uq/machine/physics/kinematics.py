@@ -123,7 +123,7 @@ class KinematicChain:
 
 @lru_cache(maxsize=64)
 def _chain(text: str) -> KinematicChain:
-    letters = text.strip().upper().partition("|")[0]  # a rotary table moves no carriage
+    letters = re.split(r"[-|]", text.strip().upper())[0]  # rotary axes move no carriage
     axes = letters.replace("F", "", 1).lower()
     if sorted(axes) != list(AXES):
         known = ", ".join("".join(p) for p in permutations("XYZ"))

@@ -60,6 +60,7 @@ class PositioningRuns:
     u_reference: float = 0.0
     growth: Floats | None = None
     length_mm: float = 0.0
+    by_target: bool = False  # whether that is another at each target, as of the faces of a polygon
     travel: tuple[float, ...] = ()  # unit vector
     motion: InMotion | None = None  # where readings were taken in motion
 

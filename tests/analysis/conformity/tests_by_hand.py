@@ -17,7 +17,7 @@ from cmm_uq.artefacts.kinds import TableSpheresFacts
 from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.artefacts.spheres.table_spheres import TableSpheres
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.base.rotary import Turntable
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.jobs.tables.machine import ProbeFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
@@ -386,7 +386,7 @@ def four_axis(figure: str) -> Callable[[str], Hand]:
         b = -150.0 * radial + 240.0 * Z + 0.5 * course[:, None] * way
         once = np.ones(2 * len(angles), dtype=np.int64)
         visits = np.tile(np.arange(1, len(angles) + 1), 2)
-        machine = Turntable("m", travel_mm=MACHINE.travel_mm, origin_mm=MACHINE.travel_mm.mean(axis=1))
+        machine = RotaryMachine("m", travel_mm=MACHINE.travel_mm, origin_mm=MACHINE.travel_mm.mean(axis=1))
         point = np.repeat([1, 2], len(angles))
         points = Points(np.concatenate([a, b]), once, point, visits, machine, {"c_deg": np.tile(angles, 2)})
         u = 0.0 if how == "no u" else 0.2

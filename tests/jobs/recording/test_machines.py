@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +13,8 @@ import cmm_uq
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine
-from cmm_uq.base.rotary import Turntable
+from cmm_uq.base.rotary import RotaryMachine
+from cmm_uq.machine.physics.effects.probing import machine_normals
 
 AXIS = np.array([450.0, 600.0, 0.0])
 BALLS = np.array([[x, y, -300.0] for y in (-200.0, 0.0, 200.0) for x in (-200.0, -50.0, 80.0, 200.0)])
@@ -99,17 +99,45 @@ def test_a_machine_without_a_bar_in_its_chain_is_the_cartesian_one(tmp_path: Pat
 def test_chain_and_table_are_read(tmp_path: Path) -> None:
     table = "table = { turns = 'clockwise', travel_deg = [-5, 365], axis_mm = [1, 2, 3] }"
     machine = read_job(written(tmp_path, ANGLES, table, on_table)).points.machine
-    assert isinstance(machine, Turntable)
-    assert (machine.chain, machine.letter, machine.clockwise, machine.axes) == ("XYZ", "c", True, ("x", "y", "z", "c"))
+    assert isinstance(machine, RotaryMachine)
+    assert machine.fourth
+    assert (machine.chain, machine.fourth.clockwise, machine.axes) == ("XYZ", True, ("x", "y", "z", "c"))
     assert machine.travel("c") == (-5.0, 365.0)
-    np.testing.assert_array_equal(machine.pivot, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(machine.pivot(machine.fourth), [1.0, 2.0, 3.0])
 
 
 @pytest.mark.parametrize(
     ("chain", "table", "message"),
     [
-        ("XYZ|AC", "", r"give one rotary table behind the bar, A, B or C .* such as XYZ\|C"),
-        ("XYZ|", "", "give one rotary table behind the bar"),
+        ("XYZ|ABC", "", r"give one or two rotary tables behind the bar, A, B or C .* such as XYZ\|C or XYZ\|AC"),
+        ("XYZ|", "", "give one or two rotary tables behind the bar"),
+        ("XYZ-|C", "", "give one or two rotary axes of a head behind the hyphen"),
+        ("XYZ|CC", "", "name each rotary axis once, A, B or C"),
+        ("XYZ-C|C", "", "name each rotary axis once, A, B or C"),
+        ("XYZ|AD", "", "name each rotary axis once, A, B or C"),
+        ("XYZ-B|C", "", "a head turns the stylus"),
+        (
+            "XYZ|C",
+            "head = { stylus_mm = [0, 0, -1] }",
+            r"\[machine.head\] is of a head, which chain = 'XYZ\|C' has not",
+        ),
+        ("XYZ|AC", "table = { axis_mm = [0, 0, 0] }", r"\[machine.table\] axis_mm does not say of which table"),
+        ("XYZ|C", "rotary = [{ name = 'A' }]", r"\[\[machine.rotary\]\] A is twice there, or not in chain"),
+        (
+            "XYZ|C",
+            "rotary = [{ name = 'C' }]\ntable = { turns = 'clockwise' }",
+            r"table C is in \[machine.table\] and in \[\[machine.rotary\]\]: leave turns",
+        ),
+        (
+            "XYZ|AC",
+            "rotary = [{ name = 'C', axis_mm = [0, 0, 0] }]\ntable = { coordinates = 'machine' }",
+            r"give a point of it, axis_mm",
+        ),
+        (
+            "XYZ|AC",
+            "rotary = [{ name = 'C', travel_deg = [0, 300] }]",
+            r"line 50: c_deg = 310 lies outside the travel of the table, 0 to 300 °. Mend it, or travel_deg in \[\[",
+        ),
         ("XYX|C", "", "give X, Y, Z once each"),
         (
             "XYZ",
@@ -133,10 +161,46 @@ def test_what_does_not_go_together_is_said(tmp_path: Path, chain: str, table: st
         read_job(job)
 
 
-def test_normals_on_a_turned_table_are_refused(tmp_path: Path) -> None:
+def with_columns(job: Path, head: str, *values: str) -> None:
+    text = (job / "recording.csv").read_text(encoding="utf-8").strip()
+    lines = [f"{line},{value}" for line, value in zip(text.split("\n")[1:], values, strict=True)]
+    (job / "recording.csv").write_text("\n".join([f"{text.split(chr(10))[0]},{head}", *lines]) + "\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize("frame", [None, "table", "machine"])
+def test_normals_on_a_turned_table_are_in_the_frame_that_the_job_says(tmp_path: Path, frame: str | None) -> None:
+    job = written(tmp_path, ANGLES, f"{ON_TABLE}\n" + (f"table = {{ normals = '{frame}' }}" if frame else ""), on_table)
+    normals = np.random.default_rng(1).normal(size=(60, 3))
+    with_columns(job, "nx,ny,nz", *(",".join(map(str, normal)) for normal in normals))
+    if frame is None:
+        with pytest.raises(CmmUqError, match=r'normals of probed points.*normals = "table" or "machine"'):
+            read_job(job)
+        return
+    points = read_job(job).points
+    turns = Rotation.from_euler("z", np.repeat(ANGLES, 12)[:, None], degrees=True)
+    along_machine = turns.apply(normals) if frame == "table" else normals
+    np.testing.assert_allclose(machine_normals(points), along_machine, atol=1e-12)
+    # and written anew they are those of the recording
+    columns = points.machine.columns_as_recorded(points.columns)
+    np.testing.assert_allclose(np.column_stack([columns[f"n{a}"] for a in "xyz"]), normals, atol=1e-12)
+
+
+def test_sensors_are_added_along_the_axes_of_the_machine(tmp_path: Path) -> None:
     job = written(tmp_path, ANGLES, ON_TABLE, on_table)
-    text = (job / "recording.csv").read_text(encoding="utf-8")
-    text = re.sub(r"(?m)$", ",0", text.strip()).replace("c_deg,0", "c_deg,nx") + "\n"
-    (job / "recording.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(CmmUqError, match="normals of probed points"):
-        read_job(job)
+    before = read_job(job).points.xyz
+    with_columns(job, "sensor_x_um,sensor_y_um,sensor_z_um", *["3,-4,5"] * 60)
+    moved = read_job(job).points.xyz - before
+    turns = Rotation.from_euler("z", np.repeat(ANGLES, 12)[:, None], degrees=True)
+    np.testing.assert_allclose(turns.apply(moved), np.tile([0.003, -0.004, 0.005], (60, 1)), atol=1e-12)
+
+
+def test_a_head_carries_the_stylus_as_its_axes_turn(tmp_path: Path) -> None:
+    """Carriages at rest over a turning head: the tip goes round, and the columns of its offset say so."""
+    table = "head = { stylus_mm = [100, 0, -50], coordinates = 'carriages' }\nrotary = [{ name = 'C', turns = 'clockwise' }]"
+    job = written(tmp_path, ANGLES, table, lambda read, axis, turn: BALLS)
+    (job / "job.toml").write_text((job / "job.toml").read_text().replace("XYZ|C", "XYZ-C"), encoding="utf-8")
+    points = read_job(job).points
+    tips = Rotation.from_euler("z", -np.repeat(ANGLES, 12)[:, None], degrees=True).apply([100, 0, -50])
+    np.testing.assert_allclose(points.xyz, np.tile(BALLS, (5, 1)) + tips - [100, 0, -50], atol=1e-6)
+    np.testing.assert_allclose(np.column_stack([points.columns[f"tip_{a}_mm"] for a in "xyz"]), tips, atol=1e-9)
+    np.testing.assert_allclose(points.carriages, np.tile(BALLS, (5, 1)), atol=1e-6)

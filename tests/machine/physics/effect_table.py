@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.rotary import RotaryAxis, RotaryMachine
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import CATALOGUE, EVERY, FURTHER, OWN
@@ -26,6 +28,7 @@ EXAMPLES = {
     "gauge blocks": "gauge-blocks-simulated", "plate": "plate-simulated", "triangle": "triangle-simulated",
     "sphere": "sphere-simulated", "plane": "plane-simulated", "spheres on a table": "table-spheres-simulated",
 }  # fmt: skip
+BY_HEAD = "spheres under a head"
 SURFACES = ("step gauge", "gauge blocks", "sphere", "plane")
 """Artefacts that are touched; of the others the centres of balls or cylinders are recorded, which have no normal."""
 
@@ -74,7 +77,7 @@ def surface_normals(kind: str, points: Points) -> Floats | None:
 def seen_by(effect: Effect, artefact: Artefact) -> bool:
     """Whether observations show an effect of its prior's size, once the freedoms of every placing are taken out."""
     points = artefact.points
-    if any(column not in points.columns for column in effect.columns):
+    if any(column not in points.columns for column in effect.columns) or effect.unfit(points) is not None:
         return False
     if effect.of_artefact and effect.name not in artefact.faults:
         return False
@@ -104,7 +107,9 @@ def row(family: list[Effect], artefacts: dict[str, Artefact]) -> str:
     summary = (inspect.getdoc(effect) or "").split("\n\n")[0].replace("\n", " ").replace("``", "`").rstrip(".")
     parameters = ", ".join(parameter(p) for p in effect.reported)
     columns = ", ".join(f"`{c}`" for c in dict.fromkeys(c for e in family for c in e.columns)) or "–"
+    heads = [True, False] if getattr(effect, "head", False) else [False]
     seen = [kind for kind, artefact in artefacts.items() if any(seen_by(e, artefact) for e in family)]
+    seen = [kind for kind in seen if (kind == BY_HEAD) in heads]
     names = ", ".join(f"`{e.name}`" for e in family)
     return f"| {names} | {summary} | {effect.formula} | {parameters} | {columns} | {', '.join(seen)} |"
 
@@ -119,6 +124,10 @@ def parameter(given: Parameter | Shape) -> str:
 def table() -> str:
     """Both tiers, and what every effect points to."""
     artefacts = {kind: recorded(kind) for kind in EXAMPLES}
+    job = read_job(ROOT / "examples" / EXAMPLES["spheres on a table"])
+    stylus, travel = np.array([60.0, 0.0, -200.0]), job.points.machine.travel_mm
+    head = RotaryMachine(travel_mm=travel, rotary=(RotaryAxis("c", head=True),), stylus_mm=stylus)
+    artefacts[BY_HEAD] = artefact_of(job.facts.artefact, replace(job.points, machine=head))
     parts = []
     tiers = {"Effects of every job": CATALOGUE, "Further effects": FURTHER, "Faults of the artefact itself": OWN}
     for title, tier in tiers.items():

@@ -297,6 +297,8 @@ def _of_all_scales(model: RecordingModel, points: Points, values: Floats) -> Ite
     """One scale of all axes, about their zero or their middle, as a function of each further column."""
     readings = points.carriages
     middle, span = 0.5 * (readings.min(axis=0) + readings.max(axis=0)), 0.5 * float(np.ptp(readings, axis=0).max())
+    if not span:  # no carriage moved
+        return
     levers = [((readings - about) / span)[:, :, None] for about in (np.zeros(3), middle)]
     for key, column in points.own_columns.items():
         if key.startswith(_PLACED) or len(np.unique(column)) < 3:

@@ -126,13 +126,14 @@ def recording(points: Points) -> bytes:
     """Points as a recording's CSV: coordinates to 0.1 nm, everything else as it was read."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    names = ["measurement", "point", "repeat", *(f"{axis}_mm" for axis in AXES), *points.columns]
+    columns = points.machine.columns_as_recorded(points.columns)
+    names = ["measurement", "point", "repeat", *(f"{axis}_mm" for axis in AXES), *columns]
     writer.writerow(names)
     xyz = points.machine.as_recorded(points.xyz, points.columns)
     for i in range(len(points)):
         numbers = [points.measurement[i], points.point[i], points.repeat[i]]
         coordinates = [f"{value:.7f}" for value in xyz[i]]
-        writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in points.columns.values())])
+        writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in columns.values())])
     return text.getvalue().encode()
 
 

@@ -27,6 +27,11 @@ REFERENCE_LENGTH = 100.0  # mm; the length of stylus that bending is stated for
 _MILLISECOND = 1e-3
 
 
+def machine_normals(points: Points) -> Floats:
+    """Outward unit normals (n, 3) along the axes of the machine."""
+    return np.asarray(points.machine.turned(normals_of(points)[:, :, None], points.columns)[:, :, 0])
+
+
 class ProbeLobing(Harmonic):
     """Three-lobed pre-travel.
 
@@ -54,7 +59,7 @@ class ProbeLobing(Harmonic):
             )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return lobes_of(normals_of(points), self.count)
+        return lobes_of(machine_normals(points), self.count)
 
 
 class ProbeMap(OfDirections):
@@ -70,7 +75,7 @@ class ProbeMap(OfDirections):
     columns, tier = NORMAL, FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        normals = normals_of(points)
+        normals = machine_normals(points)
         return np.asarray(MICROMETRE * normals[:, :, None] * harmonics(normals, 0.0)[:, None, :], dtype=np.float64)
 
 
@@ -150,13 +155,13 @@ def attitudes(points: Points) -> Floats:
 
 def _axially(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
     axis = _stylus(points)
-    part = np.einsum("ni,ni->n", normals_of(points), axis)
+    part = np.einsum("ni,ni->n", machine_normals(points), axis)
     return np.asarray(MICROMETRE * (part[:, None] * axis)[:, :, None], dtype=np.float64)
 
 
 def _bending(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
     length = np.linalg.norm([points.column(name) for name in TIP], axis=0)
-    axis, normals = _stylus(points), normals_of(points)
+    axis, normals = _stylus(points), machine_normals(points)
     across = normals - np.einsum("ni,ni->n", normals, axis)[:, None] * axis
     ratio = (length / REFERENCE_LENGTH) ** 3
     return np.asarray(MICROMETRE * ratio[:, None, None] * across[:, :, None], dtype=np.float64)
@@ -169,7 +174,7 @@ def _turning(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
 
 def _askew(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
     frame = attitudes(points)
-    own = np.einsum("ni,nij->nj", normals_of(points), frame)
+    own = np.einsum("ni,nij->nj", machine_normals(points), frame)
     angles = np.degrees(np.arctan2(own[:, [0, 2]], np.abs(own[:, 1:2])))
     return np.asarray(MICROMETRE * frame[:, :, 1:2] * angles[:, None, :], dtype=np.float64)
 
@@ -181,7 +186,7 @@ _RADIUS, *_FURTHER, _HEAD = (row.of() for row in (
     Law("probe_radius", "Error of the effective stylus radius", say("Effective stylus radius"),
         "true surface point = indicated + r·n", "probe",
         say("the effective stylus radius is wrong: qualify the probe again"), (Parameter("um", unit("µm"), 10.0),),
-        lambda p, a, b, s: MICROMETRE * normals_of(p)[:, :, None], NORMAL,
+        lambda p, a, b, s: MICROMETRE * machine_normals(p)[:, :, None], NORMAL,
         means=say("probed surfaces are indicated {size} too {wrong}"),
         sense=(say("deep, inside the material"), say("early, outside the material"))),
     # the same gap on every axis, unlike hysteresis, whose axes differ; travel is a unit vector against the normal
@@ -205,7 +210,7 @@ _RADIUS, *_FURTHER, _HEAD = (row.of() for row in (
         "controller",
         say("the trigger reaches the controller late: check the probe's interface and cable, and qualify the probe at the "
             "speed of the measurement"), (Parameter("delay_ms", unit("ms"), 1.0),),
-        lambda p, a, b, s: _MILLISECOND * (p.column("speed_mm_s")[:, None] * normals_of(p))[:, :, None],
+        lambda p, a, b, s: _MILLISECOND * (p.column("speed_mm_s")[:, None] * machine_normals(p))[:, :, None],
         (*NORMAL, "speed_mm_s"), FURTHER),
     # an alignment on the reference sphere that was off by [du dv], or a mount that has moved since (Harris 2004 eq. 14–25)
     Law("digitizer_offset", "Digitizer misaligned in its scan plane, which turns with the pose",
