@@ -25,7 +25,7 @@ _ROUNDING = 1e-6  # of a reading, °
 
 def machine_of(facts: MachineFacts) -> Machine:
     """Of three carriages, or with rotary axes too; or an arm of joints."""
-    if facts.joint:
+    if facts.is_arm:
         return _arm(facts)
     travel = np.array([getattr(facts.travel_mm, axis) or [np.nan, np.nan] for axis in AXES], dtype=np.float64)
     carriages, head, tables = parts_of_chain(facts.chain)
@@ -82,8 +82,8 @@ def in_coordinates(points: Points, facts: MachineFacts, where: str) -> Points:
 
 def _arm(facts: MachineFacts) -> Arm:
     joints, up = facts.joint, np.array(facts.arm.up, dtype=np.float64)
-    tool, revolute = np.array(facts.arm.tool_mm), np.array([joint.type == "revolute" for joint in joints])
-    geometry: dict[str, Any] = {"rows": np.array([joint.row for joint in joints]), "tool_mm": tool}
+    tool, revolute = np.array(facts.arm.tool_mm), np.array([joint.type == "revolute" for joint in joints], dtype=bool)
+    geometry: dict[str, Any] = {"rows": np.array([joint.row for joint in joints]).reshape(-1, 5), "tool_mm": tool}
     if facts.arm.home:
         home = np.vstack([np.array(facts.arm.home)[:3], [0.0, 0.0, 0.0, 1.0]])
         home[:3, :3] = nearest_rotations(home[None, :3, :3])[0]
@@ -92,19 +92,21 @@ def _arm(facts: MachineFacts) -> Arm:
         geometry["tool_mm"] = geometry["tool_mm"] + tool
     return Arm(
         facts.name,
+        origin_mm=np.array(facts.origin_mm),
+        reach_mm=facts.arm.reach_mm or np.nan,
         **geometry,
         by_screws=bool(facts.arm.home),
         modified=facts.arm.convention == "modified",
         revolute=revolute,
         sense=np.array([-1.0 if joint.reversed else 1.0 for joint in joints]),
         up=up / np.linalg.norm(up),
-        limits=np.array([joint.travel or [np.nan, np.nan] for joint in joints]),
+        limits=np.array([joint.travel or [np.nan, np.nan] for joint in joints]).reshape(-1, 2),
     )
 
 
 def required_columns(machine: Machine, header: Collection[str]) -> Sequence[str]:
     """Columns that a recording must have; coordinates of an arm follow from what its joints read, and may be left out."""
-    if not isinstance(machine, Arm):
+    if not isinstance(machine, Arm) or not machine.joints:
         return REQUIRED
     recorded = COORDINATES if any(name in header for name in COORDINATES) else ()
     return (*(name for name in REQUIRED if name not in COORDINATES), *recorded, *machine.columns_of_joints)
@@ -112,7 +114,7 @@ def required_columns(machine: Machine, header: Collection[str]) -> Sequence[str]
 
 def coordinates(machine: Machine, table: Mapping[str, Floats], lines: Sequence[int], name: str) -> Floats:
     """Coordinates (n, 3), mm, of a recording: as recorded, or by the joints of an arm."""
-    if isinstance(machine, Arm):
+    if isinstance(machine, Arm) and machine.joints:
         return by_joints(machine, table, lines, name)
     return np.column_stack([table[column] for column in COORDINATES])
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from cmm_uq.base.files.table import JobTable, Position, Range, Triple, key
+from cmm_uq.base.files.table import JobTable, Length, Position, Range, Triple, key
 from cmm_uq.base.points import Floats
 
 MOST_JOINTS = 12
@@ -102,6 +102,9 @@ class ArmFacts(JobTable):
     """Of an arm by screw axes the last frame where all joints read 0: three rows of a rotation with x, y and z in mm."""
     up: Triple = [0.0, 0.0, 1.0]
     """The direction against gravity in the frame of the base, for how joints sag: an arm on the ceiling has [0, 0, -1]."""
+    reach_mm: Length | None = None
+    """From the base to the farthest place that it measures, half of the measuring range; without `[[machine.joint]]` the
+    recording has coordinates alone, and `origin_mm` says where its origin lies from the base."""
 
     def problems(self) -> Iterator[str]:
         if not any(self.up):

@@ -280,8 +280,10 @@ class MachineFacts(JobTable):
             yield f"squareness_arcsec is given for the machine and for the map {file!r}: leave out one of the two"
         check_carriages(self.chain)
         yield from rotary_problems(self.chain, self.rotary, self.table, self.head)
-        if self.joint and (wrong := sorted(self.model_fields_set - _OF_ARMS)):
-            yield f"{wrong[0]} is of a machine of carriages, and [[machine.joint]] of an arm: leave one of them out"
+        own = _OF_ARMS if self.joint else _OF_ARMS | {"origin_mm"}
+        if self.is_arm and (wrong := sorted(self.model_fields_set - own)):
+            an_arm = "[[machine.joint]]" if self.joint else "[machine.arm]"
+            yield f"{wrong[0]} is of a machine of carriages, and {an_arm} of an arm: leave one of them out"
         screws = [number for number, joint in enumerate(self.joint, 1) if joint.direction is not None]
         if screws and len(screws) < len(self.joint):
             other = next(i for i in range(1, len(self.joint) + 1) if i not in screws)
@@ -299,8 +301,12 @@ class MachineFacts(JobTable):
             and not any(self.arm.tool_mm)
         ):
             yield "no [[machine.joint]] has a length, and the tool is on the last: give a_mm and d_mm of its rows"
-        if self.arm.model_fields_set and not self.joint:
-            yield "[machine.arm] is of an arm: give its rows, [[machine.joint]]"
+        if not self.joint and self.arm.model_fields_set - ({"reach_mm", "up"} if self.is_arm else set()):
+            yield "[machine.arm] is of an arm: give its rows, [[machine.joint]], or of one whose joints are not read reach_mm"
+
+    @property
+    def is_arm(self) -> bool:
+        return bool(self.joint or self.arm.reach_mm)
 
 
 _OF_ARMS = frozenset(("name", "manufacturer", "model", "serial", "owner", "joint", "arm", "calibrate"))
