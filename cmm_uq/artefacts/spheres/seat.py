@@ -26,7 +26,7 @@ from cmm_uq.machine.model.recorded import place
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.uncertainty.quantity import rounded
 
-_STRAY = 5.0  # mm by which no arm errs
+_STRAY, _LEAST_READINGS = 5.0, 4  # mm by which no arm errs; fewer readings of a seat say little of how they scatter
 _AXES = {axis: Verbatim(axis.upper()) for axis in AXES}
 
 
@@ -40,6 +40,10 @@ class Seat(Artefact):
         self.points, self.placings = points, Placings.of(points.measurement)
         self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
         self._axes = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+        if (most := max(map(len, self.placings.rows))) < _LEAST_READINGS:
+            raise CmmUqError(
+                f"no seat has {_LEAST_READINGS} readings; most have {most}", where=where, fix="Read each ten times"
+            )
         stray = np.linalg.norm(self.deviations(), axis=1)
         if stray.max(initial=0.0) > _STRAY:
             row = int(np.argmax(stray))
@@ -80,7 +84,7 @@ class Seat(Artefact):
             "SPAT": [2 * np.sqrt(np.sum(one**2) / (len(one) - 1)) for one in away],
             "SPAT maximum": [one.max() for one in away],
         }
-        lengths = np.array([float(np.linalg.norm(self.points.machine_xyz[own].mean(axis=0))) for own in each])
+        lengths = np.array([np.round(np.linalg.norm(self.points.machine_xyz[own].mean(axis=0)), 1) for own in each])
         return {name: ArtefactFigure(np.array(of), rows, lengths) for name, of in values.items()}
 
 

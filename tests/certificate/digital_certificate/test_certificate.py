@@ -180,6 +180,9 @@ def test_every_figure_is_there_with_its_unit(name: str) -> None:
             if section in ("estimates", "artefact") and parameter in free:
                 continue
             hidden = keys[-1] == "interval95" and isclose_interval(data, path)
+            hidden = hidden or (
+                keys[-1] in ("U", "k") and (owner_of(data, path).get("k") or 1.0) < 1
+            )  # a DCC has none below 1
             exact = keys[-1] in ("u", "U") and number == 0  # without an uncertainty
             if not hidden and not exact and not there(number, None if keys[-1] == "k" else expected(owner), known):
                 missing.append((path, number))
@@ -187,10 +190,15 @@ def test_every_figure_is_there_with_its_unit(name: str) -> None:
     assert sum(map(len, found.values())) > 10
 
 
+def owner_of(data: Any, path: tuple[str, ...]) -> Any:
+    for key in path[:-1]:
+        data = data[int(key) if isinstance(data, list) else key]
+    return data
+
+
 def isclose_interval(data: Any, path: tuple[str, ...]) -> bool:
     """Whether an interval is symmetric to the two digits that are printed of U, so that U says it."""
-    for key in path[:-2]:
-        data = data[int(key) if isinstance(data, list) else key]
+    data = owner_of(data, path[:-1])
     low, high = data["interval95"]
     digits = 1 - math.floor(math.log10(data["U"] or 1.0))
     above, below = (round(side, digits) for side in (high - data["value"], data["value"] - low))

@@ -268,7 +268,7 @@ _REVOLUTE: tuple[Callable[[str], OfJoint], ...] = (
 
 def effects_of_arm(points: Points) -> dict[str, Effect]:
     """Of its joints and its tool, where joints are read, and of what it probes with."""
-    arm, found = arm_of(points), [effect for effect in probing.EFFECTS if effect.name in ("probe_radius", "pre_travel")]
+    arm, found = arm_of(points), list(probing.OF_ANY_TIP)
     if not arm.joints:
         return {effect.name: effect for effect in found}
     for joint, turns in zip(arm.joints, arm.revolute, strict=True):

@@ -242,3 +242,4 @@ _RADIUS, *_FURTHER, _HEAD = (row.of() for row in (
 EFFECTS: tuple[Effect, ...] = (
     _RADIUS, ProbeLobing(), ArtefactSag(), *_FURTHER, *(ProbeLobing(count) for count in (2, 4, 6)), ProbeMap(), _HEAD,
 )  # fmt: skip
+OF_ANY_TIP = tuple(effect for effect in EFFECTS if effect.name in ("probe_radius", "pre_travel"))  # whatever carries it
