@@ -19,6 +19,7 @@ from tests.jobs.test_reading import edit
 CHAINS = ["XYZ|AC", "XYZ-CA"]
 
 
+@pytest.mark.long(but="XYZ-CA")
 @pytest.mark.parametrize("chain", CHAINS)
 def test_location_tilt_positioning_and_play_of_both_axes_are_estimated(tmp_path: Path, chain: str) -> None:
     """Of a machine of 4 × 4 matrices; twenty-two numbers within 3 u, and the location of each axis named with its U."""

@@ -120,6 +120,7 @@ def test_no_link_enters_a_box_or_the_floor_and_the_reflector_is_seen() -> None:
             assert off.min() > 35.0  # taken at 32 places of a link
 
 
+@pytest.mark.long
 def test_without_a_cell_such_poses_are_chosen() -> None:
     poses = readings(plan_of(planned('criterion = "D"\nnumber = 25\n')))
     links = np.concatenate([along(frames(q, nominal(), TOOL))[1] for q in poses])
@@ -242,6 +243,7 @@ def test_poses_of_a_joint_without_travel_and_of_two_stations_are_refused() -> No
         plan_of(job)
 
 
+@pytest.mark.long
 def test_the_sense_of_the_last_move_is_planned_where_play_is_looked_for() -> None:
     named = ('"zero_q2", ', '"zero_q2", "slack_q3", ')
     points = plan_of(planned('criterion = "D"\nnumber = 12\n', change=named)).outlook.points

@@ -138,6 +138,7 @@ def test_an_arm_has_no_effects_of_carriages() -> None:
         evaluate_job(robot(effects=("scale_x",)))
 
 
+@pytest.mark.long
 def test_play_that_the_model_leaves_out_is_named() -> None:
     """Joint 1 stands 80″ behind on either side; the diagnosis says so, and no row is blamed."""
     plain = robot()

@@ -18,6 +18,7 @@ from tests.conftest import ROOT
 SIZE = len(machines.NAMED)
 
 
+@pytest.mark.long
 def test_a_diagnosis_says_what_the_certificate_of_the_recording_says() -> None:
     """The same search, its verdict and what is withheld; the factors of the job it does not state at all."""
     job = ROOT / "examples" / "step-gauge-simulated"

@@ -67,6 +67,7 @@ def test_nothing_is_tried_where_nothing_is_too_uncertain(found: PartMeasurement)
     assert "foreseen" not in part_results(plain)
 
 
+@pytest.mark.long
 def test_a_plan_tells_what_it_does_for_a_part(tmp_path: Path) -> None:
     for name in (PART, CALIBRATION, PLAN):
         copytree(ROOT / "examples" / name, tmp_path / name)
