@@ -107,7 +107,7 @@ class AxisRuns(Artefact):
         self._profile, self._u_faces = reversed_profile(own, self.runs, self.readings, where), np.zeros(len(own))
         if self._polygon:
             read, certified = self.readings / self._factor(turns=True), facts.u_polygon_arcsec is not None
-            faces, self._u_faces = faces_of(own, self._polygon, read, certified=certified)
+            faces, self._u_faces = faces_of(own, self._polygon, read, where, certified=certified)
             self._profile += self._factor(turns=True) * faces
         spans = [np.ptp(self._base[run.rows]) for run in self.runs if run.kind == ALONG]
         self._length: tuple[Size, ...] = ()

@@ -343,11 +343,13 @@ def _of_table(points: Points, number: int, rows: Ints) -> Run | None:
     return None
 
 
-def faces_of(points: Points, runs: tuple[Run, ...], readings: Floats, *, certified: bool) -> tuple[Floats, Floats]:
+def faces_of(
+    points: Points, runs: tuple[Run, ...], readings: Floats, where: str | None, *, certified: bool
+) -> tuple[Floats, Floats]:
     """(n,) what of readings (n,), ″, is the polygon's, by its certificate or by closure; and u of it, by closure alone.
 
     Of several settings of a polygon on the table each reading is the sum of what the table errs there, of its face's deviation
-    from that of the first, and of a zero of the setting: least squares part them.
+    from that of the first, and of a zero of the setting: least squares part them, or what they leave open is refused.
     """
     n, rows = len(points), np.concatenate([run.rows for run in runs])
     face = points.columns[FACE]
@@ -366,8 +368,15 @@ def faces_of(points: Points, runs: tuple[Run, ...], readings: Floats, *, certifi
     design = np.hstack(blocks)
     inverse = np.linalg.pinv(design, rcond=1e-9)
     found = inverse @ readings[rows]
-    q, dof = len(numbers) - 1, len(rows) - np.linalg.matrix_rank(design)
-    s = np.sqrt(np.sum((readings[rows] - design @ found) ** 2) / dof) if dof > 0 else 0.0
+    q, rank = len(numbers) - 1, int(np.linalg.matrix_rank(design))
+    dof = len(rows) - rank
+    if rank < design.shape[1] - 1 or not dof:  # all positions and all zeros are known but for a constant
+        raise CmmUqError(
+            "the settings of the polygon do not part its faces from the table's errors",
+            where=where or "recording",
+            fix="Read all faces in two settings one face apart, or more, or give face_arcsec and u_polygon_arcsec",
+        )
+    s = np.sqrt(np.sum((readings[rows] - design @ found) ** 2) / dof)
     profile, u = np.zeros(n), np.zeros(n)
     profile[rows] = blocks[0] @ found[:q]
     u[rows] = s * (blocks[0] @ np.linalg.norm(inverse[:q], axis=1))
