@@ -119,6 +119,7 @@ class RotaryMachine(Machine):
             before = self.head[: self.head.index(axis)]
             return self._turned(self.tip(columns), before, columns, back=True) - self.pivot(axis)
         there = self._turned(xyz, self.tables[self.tables.index(axis) :], columns)
+        # by way of the readings, whose rounding the figures of issued certificates have
         return np.asarray(there + self.origin_mm - self.origin_mm - self.pivot(axis))
 
     def carried(self, axis: RotaryAxis, vectors: Floats, columns: Mapping[str, Floats]) -> Floats:

@@ -21,6 +21,7 @@ from cmm_uq.maths.geometry.feature import nearest_rotations
 
 _FINEST = 9  # decimals of a number that is looked at as printed
 _ROUNDING = 1e-6  # of a reading, °
+_FARTHEST = 1.01  # of the reach, from which on a place is beyond it
 
 
 def machine_of(facts: MachineFacts) -> Machine:
@@ -114,9 +115,20 @@ def required_columns(machine: Machine, header: Collection[str]) -> Sequence[str]
 
 def coordinates(machine: Machine, table: Mapping[str, Floats], lines: Sequence[int], name: str) -> Floats:
     """Coordinates (n, 3), mm, of a recording: as recorded, or by the joints of an arm."""
-    if isinstance(machine, Arm) and machine.joints:
-        return by_joints(machine, table, lines, name)
-    return np.column_stack([table[column] for column in COORDINATES])
+    if not isinstance(machine, Arm):
+        return np.column_stack([table[column] for column in COORDINATES])
+    found = (
+        by_joints(machine, table, lines, name)
+        if machine.joints
+        else np.column_stack([table[column] for column in COORDINATES])
+    )
+    away = np.linalg.norm(found + machine.origin_mm, axis=1)
+    if np.any(beyond := away > _FARTHEST * machine.reach_mm):  # no reach is stated: none
+        row = int(np.argmax(beyond))
+        said = f"lies {away[row]:.0f} mm from the base, beyond the reach of the arm, {machine.reach_mm:g} mm"
+        fix = "Mend it, or reach_mm in [machine.arm] or origin_mm in [machine]"
+        raise CmmUqError(said, where=f"{name} line {lines[row]}", fix=fix)
+    return found
 
 
 def by_joints(machine: Arm, table: Mapping[str, Floats], lines: Sequence[int], name: str) -> Floats:

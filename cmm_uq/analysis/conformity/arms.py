@@ -6,7 +6,7 @@ this project's own. Places are those from the base of the arm, whose reach the j
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -47,6 +47,7 @@ ORIENTATIONS, ORIENTED_POINTS = 5, 5
 LINES, ON_LINE, REPEATS, LONGEST = 7, 5, 3, 0.66  # of lengths; the longest over the measuring range, twice the reach
 BARS, EITHER, SHORT, LONG = 20, 6, (0.5, 0.75), (1.2, 1.5)  # positions; of either bar; its length over the reach
 READINGS, ZONES = 10, ((0.0, 0.2), (0.2, 0.8), (0.8, np.inf))  # in each seat; its distance from the base over the reach
+_OTHERWISE = 10.0  # ° (mm) by which some joint stands otherwise in another orientation
 _FAR = 0.25  # of the reach, from which on two places are two
 _SAME_MM = 100.0  # lines nearer than this, and within 10°, are one
 _ALONG = np.cos(np.radians(10.0))
@@ -77,10 +78,20 @@ def _groups(points: Points, *, recorded: bool, least: int = 1) -> dict[int, list
     return found
 
 
+def _turned(points: Points, groups: list[int]) -> Collection[int]:
+    """Of groups those between which some joint turned; all of them where no joints were read."""
+    if not (isinstance(points.machine, Arm) and points.machine.joints):
+        return groups
+    read = np.column_stack([points.readings[joint] for joint in points.machine.joints])
+    at = {group: read[points.rows_of_groups[group]].mean(axis=0) for group in groups}
+    return most_apart({i: {j for j in at if j != i and np.abs(at[i] - at[j]).max() < _OTHERWISE} for i in at})
+
+
 def _two_places(artefact: Artefact, what: Text, repeats: int, least: int, *, recorded: bool) -> Condition:
     """That what is measured in one place was measured in another, so far from it as counts."""
     points, reach = artefact.points, _reach(artefact)[0]
-    whole = [own for own in _groups(points, recorded=recorded, least=least).values() if len(own) >= repeats]
+    every = _groups(points, recorded=recorded, least=least).values()
+    whole = [own for own in every if len(own if repeats == 1 else _turned(points, own)) >= repeats]
     middles = [
         np.mean([points.xyz[points.rows_of_groups[group]].mean(axis=0) for group in own], axis=0) for own in whole
     ]
@@ -347,8 +358,9 @@ CLAUSES = {
                "numbered by repeat; the diameter of the smallest sphere that holds the five centres, in two places.",
                f"{_MAKER}: five points, the probe pointing one way, and the name 5x5; that it is the smallest sphere: the "
                "figure is called a diameter; two places: this project"),
-        Clause("orientations", say("orientations"), "That they differ is for the procedure; the centre is that of the "
-               "least-squares sphere of free diameter.", CHOSEN),
+        Clause("orientations", say("orientations"), "Where joints are read, each turns some joint by 10° from every "
+               "other, else that they differ is for the procedure; the centre is that of the least-squares sphere"
+               " of free diameter.", CHOSEN),
         Clause("lengths", say("lengths"), "Seven lines (10° or 100 mm apart) of five lengths, each three times; a horizontal, "
                "a vertical and an oblique line; the longest at least 66 % of the measuring range.", "105 lengths: as commonly "
                "reported of the series; the rest: this project, the stricter reading", of=("E_Uni", "E_Bi")),

@@ -92,7 +92,7 @@ def method(result: Result) -> Section:
     count = ls.rank + ls.null_space.shape[1]
     stated_facts = facts(
         (say("Observations used"), number(len(ls.residuals))),
-        (say("Parameters, rank, condition number"),
+        (say("Parameters, rank, condition number"), number(count) if not count else
          say("{count}, {rank}, {condition:.3g}", count=count, rank=ls.rank, condition=ls.condition)),
         (say("Degrees of freedom"), number(ls.degrees_of_freedom)),
         (say("Residual standard deviation"),

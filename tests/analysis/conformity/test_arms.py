@@ -16,6 +16,7 @@ from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
+from cmm_uq.base.arm import Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
@@ -189,3 +190,25 @@ def test_what_does_not_go_with_an_arm_without_joints_is_refused(keys: str, said:
     edit(job, r"^arm = .*", keys)
     with pytest.raises(CmmUqError, match=said):
         read_job(job)
+
+
+def test_a_place_beyond_the_stated_reach_is_refused(tmp_path: Path) -> None:
+    """A smaller reach would make two thirds of the measuring range of any length, and far out of any seat."""
+    job = tmp_path / "job"
+    write_new("seat", job, {})
+    edit(job, r"^arm = .*", "arm = { reach_mm = 500.0 }")
+    with pytest.raises(CmmUqError, match="from the base, beyond the reach of the arm, 500 mm"):
+        read_job(job)
+
+
+@pytest.mark.parametrize(("degrees", "lack"), [(30.0, ()), (12.0, ()), (8.0, ("5 orientations",))])
+def test_orientations_differ_where_joints_were_read(degrees: float, lack: tuple[str, ...]) -> None:
+    name = ("ISO 10360-12:2016", "L_Dia.5x5:Art:Tact.AArm")
+    artefact = ARMS[name]("complete")[0]
+    points = artefact.points
+    machine = Arm("a", rows=np.zeros((2, 5)), revolute=np.ones(2, dtype=bool), sense=np.ones(2), reach_mm=1000.0,
+                  limits=np.full((2, 2), np.nan))  # fmt: skip
+    columns = {**points.columns, "q1_deg": degrees * points.repeat, "q2_deg": np.zeros(len(points))}
+    found = lacks(name, of_points(artefact, dataclasses.replace(points, machine=machine, columns=columns)))
+    assert [any(words in text for text in found) for words in lack] == [True] * len(lack)
+    assert lack or not found

@@ -22,7 +22,7 @@ from cmm_uq.base.units import MICROMETRE
 _SMALLEST = 0.4  # smallest rms of a function that is considered, over the noise
 _FOLLOWED, IMPROBABLE = 40, 1e-3  # versions that a prediction averages, and what a version adds to it at least
 # Part of the largest log evidence over nothing from which on a form may come first between its nodes, and how many of these
-_BETWEEN, _NODES = 0.5, 6
+_WORTH_DIVIDING, _NODES = 0.5, 6
 _SINGULAR = 1e-9  # part of the largest singular value below which another counts as zero
 
 
@@ -145,7 +145,7 @@ class FunctionFit:
             of_node, most = log.max(axis=1), float(log.max(initial=-np.inf))
             likely = np.argsort(-of_node, kind="stable")[:_NODES]
             likely = likely[of_node[likely] > most + np.log(IMPROBABLE)]
-            finer = family.finer(likely) if most - self.nothing > _BETWEEN * (best - self.nothing) else None
+            finer = family.finer(likely) if most - self.nothing > _WORTH_DIVIDING * (best - self.nothing) else None
             if finer is not None:
                 families.append(finer)
                 known.append(self.of_family(finer))
