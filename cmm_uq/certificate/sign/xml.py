@@ -231,7 +231,8 @@ def _further(part: _Element, signed: set[str]) -> Iterator[str]:
 
 
 def _name(element: _Element) -> str:
-    return str(element.tag).rpartition("}")[2]
+    # a comment or an instruction has a function in place of a name
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else f"{str(element)[:2]} … >"
 
 
 def _shape(element: _Element) -> list[Text]:

@@ -272,6 +272,16 @@ def test_what_a_signature_holds_besides_its_own_form_is_named(
     )
 
 
+@pytest.mark.parametrize(("further", "what"), [("<!-- U = 0.1 µm -->", "<! … >"), ("<?U 0.1?>", "<? … >")])
+def test_a_comment_or_an_instruction_in_a_signature_is_named_as_one(
+    further: str, what: str, signed: bytes, trust: Trust
+) -> None:
+    root = signed.replace(b"</ds:Signature>", f"{further}</ds:Signature>".encode())
+    assert root != signed
+    found = only(signatures_of_xml(root, trust))
+    assert [one.rpartition(": ")[2] for one in map(str, found.problems)][-1] == what
+
+
 def stamped(signed: bytes, held: Held, of: bytes | None = None) -> etree._Element:
     """With a time stamp over the canonical signature value, by another program (RFC 3161; EN 319 132-1, 5.3)."""
     from asn1crypto import algos, tsp
