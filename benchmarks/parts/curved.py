@@ -60,6 +60,7 @@ class Sort:
     odd : times one curve of all, drawn at random.
     wave_um, periods_mm : amplitude of a periodic error of each axis, and between which its period lies.
     gap_um : play of each axis.
+    warm_k : standard uncertainty of temperatures, as is stated (:func:`benchmarks.parts.machines.on_machine`).
     by_prior : whether each kind of error has a size of its own, half-normal with what physics allows, instead.
     """
 
@@ -70,6 +71,7 @@ class Sort:
     periods_mm: tuple[float, float] = (2.0, 80.0)
     gap_um: float = 0.5
     crashed: bool = False
+    warm_k: float = 0.0
     by_prior: bool = False
 
 
@@ -82,6 +84,7 @@ SORTS = (
     Sort("play", gap_um=8.0),
     Sort("crashed", crashed=True),
     Sort("as the priors have it", by_prior=True),
+    Sort("thermal", warm_k=0.5),
 )
 PRIOR = {"along": 20.0, "across": 50.0, "turn": 30.0, "gap": 30.0, "wave": 10.0, "scale": 300.0, "square": 500.0}
 """What physics allows, in µm, ″ and ppm, as docs/machine/field.md states it."""
@@ -160,7 +163,9 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     one = machines.Cell(cell.artefact, cell.noise, 0.0)
     return counted(
         cell, seed, number,
-        lambda random: machines.on_machine(one, drawn(cell.sort, random), random, machines.Made(), 0.7e-3),
+        lambda random: machines.on_machine(
+            one, drawn(cell.sort, random), random, machines.Made(), 0.7e-3, warm_k=cell.sort.warm_k
+        ),
     )  # fmt: skip
 
 

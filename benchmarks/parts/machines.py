@@ -36,12 +36,15 @@ from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.plan import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
+from cmm_uq.app.commands.estimation import doubt_of
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
+from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.uncertainty.propagation import Source, simulate
 
@@ -56,6 +59,7 @@ FACES = {"step gauge": 6, "dense gauge": 41}
 """On each of the seven lines of a gauge."""
 U_TEST_UM, MPE_K = 0.5, 750.0  # of a tested length; mm in which a permissible error grows by itself
 PART = Expansion(11.5e-6, 1e-6, 21.0, 0.3)
+SCALE = Expansion(8e-6, 1e-6, 22.0)  # of machines in a warm room
 
 
 @dataclass(frozen=True)
@@ -116,14 +120,16 @@ def _nominal() -> Known:
     return known
 
 
-def calibrated(cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator) -> Artefact:
-    """The recording of a calibration as the package reads it."""
+def calibrated(
+    cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator, warm: float = 0.0
+) -> Artefact:
+    """The recording of a calibration as the package reads it; ``warm``: relative expansion of the artefact that is left."""
     repeats = 1 if cell.noise == "stated" else 3
     if cell.artefact in FACES:
-        growth = 1e-3 * U_GAUGE_UM / GAUGE_MM * random.standard_normal()
+        growth = 1e-3 * U_GAUGE_UM / GAUGE_MM * random.standard_normal() + warm
         made = truth.step_gauge(hidden, growth, repeats, sigma, offset, random, FACES[cell.artefact])
         return StepGauge(ReferencedFacts(kind="step_gauge", u_um=U_GAUGE_UM, length_mm=GAUGE_MM), as_points(made))
-    length = BAR_MM + 1e-3 * U_BAR_UM * random.standard_normal()
+    length = (BAR_MM + 1e-3 * U_BAR_UM * random.standard_normal()) * (1 + warm)
     made = truth.bars(hidden, length, repeats, sigma, offset, random)
     certified = {} if cell.artefact == "free bars" else {"length_mm": BAR_MM, "u_um": U_BAR_UM}
     return Ballbar(ArtefactFacts(kind="ballbar", **certified), as_points(made))
@@ -158,22 +164,29 @@ def on_machine(
     beside: Sequence[str] = (),
     *,
     tested: bool | None = None,
+    warm_k: float = 0.0,
 ) -> dict[str, Any]:
     """A machine with a hidden truth, calibrated, corrected, measuring the part.
 
     ``sigma``: its noise, mm. ``machine``: as it is known, its axes read as is stated. ``beside``: artefacts of further
     certificates, in order; how probable each is by those before is kept, and one that is not is left out. ``tested``: whether
     a test of lengths that the corrected machine passed is stated besides; ``None`` for no test, which is made else anyhow.
+    ``warm_k``: standard uncertainty, as stated, of the temperatures of the artefact in the calibration and of each scale on
+    the day of the part, when these are at 22 °C.
     """
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
-    model = RecordingModel(calibrated(cell, hidden, sigma, offset, random), NAMED)
+    of_artefact = PART.cte_per_k * warm_k * float(random.standard_normal()) if warm_k else 0.0
+    model = RecordingModel(calibrated(cell, hidden, sigma, offset, random, of_artefact), NAMED)
+    stated_k = Circumstances(cte_per_k=PART.cte_per_k, uncertainty=TestUncertainty(u_temperature_k=warm_k))
+    causes = causes_of(model.artefact, stated_k) if warm_k else ()
     given = sigma if cell.noise == "stated" else None
     _, mean, _ = joint_posterior(model, (), sigma)
     certificate = with_curves(MachineState(machine, NAMED, mean[None], StatedNoise(np.full(3, sigma)),
                                            unmodelled=with_readings(unmodelled, machine), corrections=mean))  # fmt: skip
     seed, taken, chances = int(random.integers(2**31)), list[FurtherRecording](), list[float]()
-    state = given_recording(certificate, model, given, TRIALS, seed)
+    doubt = doubt_of(model, model.estimate(), sigma, causes)
+    state = given_recording(certificate, model, given, TRIALS, seed, doubt)
     known = None if given is None else white(given)
     for artefact in beside:
         first = FurtherRecording(model, own_noise(model, certificate.unmodelled, seed, known))
@@ -198,14 +211,20 @@ def on_machine(
     growth = (PART.cte_per_k + PART.u_cte_per_k * random.standard_normal()) * (
         PART.temperature_c - 20 + PART.u_temperature_k * random.standard_normal()
     ) - PART.cte_per_k * (PART.temperature_c - 20)
+    scales, today = Surroundings().scales, hidden
+    if warm_k:
+        scales, cte = (replace(SCALE, u_temperature_k=warm_k),) * 3, SCALE.u_cte_per_k * random.standard_normal()
+        kelvin = SCALE.excess + warm_k * random.standard_normal(3)
+        expanded = (SCALE.cte_per_k + cte) * kelvin - SCALE.cte_per_k * SCALE.excess
+        today = replace(hidden, scale=hidden.scale + 1e6 * expanded)
     pose = placed(random)
     part = truth.made_part(random, made.place_um, made.form_um)
-    measuring = truth.Measuring(hidden, corrected, pose.rotation, pose.translation_mm, float(np.hypot(sigma, offset)),
+    measuring = truth.Measuring(today, corrected, pose.rotation, pose.translation_mm, float(np.hypot(sigma, offset)),
                                 1e-3 * U_TIP_UM * float(random.standard_normal()), float(growth))  # fmt: skip
     normals = np.concatenate([normal for _, normal in truth.nominal_part().values()])
     points = measuring.measured(joined(part), normals, random)
     true = truth.characteristics(part)
-    how = MeasurementConditions(state, (pose,), Surroundings(PART), measured=points)
+    how = MeasurementConditions(state, (pose,), Surroundings(PART, scales), measured=points)
     virtual = Virtual(plan(), how, dict(_nominal()), PILOT)
     errors = virtual.errors(random, TRIALS)
     simulated = simulate(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
