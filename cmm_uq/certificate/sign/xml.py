@@ -231,8 +231,7 @@ def _further(part: _Element, signed: set[str]) -> Iterator[str]:
 
 
 def _name(element: _Element) -> str:
-    # a comment or an instruction has a function in place of a name
-    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else f"{str(element)[:2]} … >"
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else f"{str(element)[:2]} … >"  # a comment
 
 
 def _shape(element: _Element) -> list[Text]:
