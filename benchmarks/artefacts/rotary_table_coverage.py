@@ -72,12 +72,15 @@ def wave(machine: dict[str, np.ndarray], name: str, c: float, order: int) -> flo
     return float(a * np.cos(order * c) - b * np.sin(order * c))
 
 
-def recorded(machine: dict[str, np.ndarray], names: list[str], random: np.random.Generator, folder: Path) -> Path:
-    """A job of a machine: coefficients by effect, µm or ″."""
+def recorded(
+    machine: dict[str, np.ndarray], names: list[str], random: np.random.Generator, folder: Path,
+    spheres: np.ndarray = SPHERES, turns: tuple[np.ndarray, np.ndarray] = (ANGLES, SENSES), noise_um: float = NOISE_UM,
+) -> Path:  # fmt: skip
+    """A job of a machine: coefficients by effect, µm or ″; ``turns``: angles, °, and the senses in which they are reached."""
     offset = MICROMETRE * np.array([*(float(machine.get(f"rotary_location_c_{a}", [0.0])[0]) for a in "xy"), 0.0])
     lean = turning(SECOND * np.array([*(float(machine.get(f"rotary_tilt_c_{a}", [0.0])[0]) for a in "xy"), 0.0]))
     rows = ["measurement,point,repeat,x_mm,y_mm,z_mm,c_deg,c_approach"]
-    for visit, (degrees, sense) in enumerate(zip(ANGLES, SENSES, strict=True), 1):
+    for visit, (degrees, sense) in enumerate(zip(*turns, strict=True), 1):
         c = np.radians(degrees)
         positioning = sum(wave(machine, f"rotary_positioning_c_{n}", c, n) for n in (1, 2))
         positioning += 0.5 * sense * float(machine.get("rotary_play_c", [0.0])[0])
@@ -89,8 +92,8 @@ def recorded(machine: dict[str, np.ndarray], names: list[str], random: np.random
         wobble = [a * np.cos(c) - b * np.sin(c), -a * np.sin(c) - b * np.cos(c)]
         error = turning(SECOND * np.array([*wobble, 0.0])) @ turning(SECOND * np.array([0.0, 0.0, positioning]))
         about = error @ lean @ turning(np.array([0.0, 0.0, c])) @ lean.T
-        there = offset + MICROMETRE * np.array([*radial, axial]) + (SPHERES - offset) @ about.T
-        read = (there + random.normal(0, MICROMETRE * NOISE_UM, there.shape)) @ turning(np.array([0.0, 0.0, c]))
+        there = offset + MICROMETRE * np.array([*radial, axial]) + (spheres - offset) @ about.T
+        read = (there + random.normal(0, MICROMETRE * noise_um, there.shape)) @ turning(np.array([0.0, 0.0, c]))
         rows += [
             f"1,{i},{visit},{','.join(f'{v:.7f}' for v in p)},{degrees:.10g},{sense:g}" for i, p in enumerate(read, 1)
         ]

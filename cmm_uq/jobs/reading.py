@@ -328,7 +328,7 @@ def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> Ce
 def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str]]:
     """Files of its error maps and their covariance, of its temperature log, and of its digitizer's calibration."""
     calibration, log = calibration_file(facts.digitizer), facts.temperature_log
-    maps = [name for given in facts.error_map for name in (given.file, given.covariance) if name is not None]
+    maps = [name for given in facts.corrections for name in (given.file, given.covariance) if name is not None]
     return maps, [log.file] if log else [], [calibration] if calibration else []
 
 

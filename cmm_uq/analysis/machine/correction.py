@@ -10,7 +10,7 @@ What a map is worth shows on set-ups that it was not made from: it is made anew 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagr
 from cmm_uq.analysis.machine.state import StatementEvidence, of_machine
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
-from cmm_uq.base.points import AXES, Floats, Machine, Points
+from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model.field import AxisFunction, GivenPeriod
 from cmm_uq.machine.model.kind import Observed
@@ -101,7 +101,8 @@ def field_map(
     error_map = replace(_filled(blank, figures @ mean), covariance=covariance)
     rms = float(np.sqrt(before) / MICROMETRE), float(np.sqrt(after) / MICROMETRE)
     denied = disagreeing(model, posterior, drawn.recorded(model, posterior))
-    return FieldMap(error_map, _omitted(model, drawn, held), rms, denied, _held_out(drawn, seed), drawn.statements)
+    held_out = tried(drawn, seed, lambda one: isinstance(one, AxisFunction), *held_out_groups(drawn.model))
+    return FieldMap(error_map, _omitted(model, drawn, held), rms, denied, held_out, drawn.statements)
 
 
 def _of_place(effect: Effect) -> bool:
@@ -208,19 +209,23 @@ def _beside(drawn: DrawnErrors, machine: Machine) -> Floats:
     return np.sqrt(variance)
 
 
-def _held_out(drawn: DrawnErrors, seed: int) -> HeldOutCorrection | None:
-    """Of observations that are left out in turn; the errors' sizes, too, are found without them."""
+def tried(
+    drawn: DrawnErrors, seed: int, corrects: Callable[[Effect], bool], groups: Ints, unseen: Text, folds: int = FOLDS
+) -> HeldOutCorrection | None:
+    """Of observations that are left out in turn; the errors' sizes, too, are found without them.
+
+    ``corrects``: which effects beside the named ones are corrected. ``groups``: (m,) what is left out together.
+    """
     model = drawn.model
     estimate = model.estimate()
     linear, whole = estimate.linear, drawn.field_of(model)
-    smooth = [one for one in whole.effects if isinstance(one, AxisFunction)]
+    smooth = [one for one in whole.effects if corrects(one)]
     seen = [model.seen(model.columns(one, (), estimate.about), estimate.about) for one in smooth]
     every = np.hstack([linear.observed[:, None], linear.design[:, : whole.modelled], *seen])
     placing = linear.freedoms.over(linear.noise_scale)
-    groups, unseen = held_out_groups(model)
     numbers = np.unique(groups)
     squares, expected, count = np.zeros(3), np.zeros(2), 0
-    folds = FOLDS if len(numbers) > 4 * FOLDS else min(len(numbers), FOLDS)
+    folds = folds if len(numbers) > 4 * folds else min(len(numbers), folds)
     if folds < 3:
         return None
     for fold in range(folds):
@@ -233,7 +238,7 @@ def _held_out(drawn: DrawnErrors, seed: int) -> HeldOutCorrection | None:
         except (CmmUqError, np.linalg.LinAlgError):
             return None
         draws = field.coefficients(sizes.noise, sizes.families, np.random.default_rng([seed, fold]))
-        smooth_columns = field.modelled + columns_of(field.effects, lambda one: isinstance(one, AxisFunction))
+        smooth_columns = field.modelled + columns_of(field.effects, corrects)
         draws = draws[:, np.append(np.arange(field.modelled), smooth_columns)]
         sigma = max(alone.sigma_of_residuals, model.least_noise, 1e-7)
         left, known, open_ = predicted(placing, _of_machine(linear, every, whole.modelled, ~out, sigma), out)

@@ -127,15 +127,17 @@ class DrawnErrors:
     @classmethod
     def of(
         cls, model: RecordingModel, doubt: Doubt, observe: Observed, seed: int, draws: int = DRAWS,
-        beside: FurtherRecordings = ALONE,
+        beside: FurtherRecordings = ALONE, others: Sequence[Unmodelled] | None = None,
     ) -> DrawnErrors:  # fmt: skip
         """``doubt``: what is stated to be in doubt about the unknowns. ``beside``: what is taken together with the recording.
 
+        ``others``: errors beside the named ones; by default those of three straight axes.
         Raises ``CmmUqError`` where the machine's travel is not stated, or the recording does not allow it.
         """
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(37,)))
         thinned = with_quantities(model, observe, seed, _MOST)
-        others, statements = as_recorded_allows(thinned, other_errors(model), beside=beside.recordings)
+        known = other_errors(model) if others is None else others
+        others, statements = as_recorded_allows(thinned, known, beside=beside.recordings)
         field = RecordedField.of(thinned, others, beside=beside.recordings, in_doubt=beside.doubted(thinned))
         sizes = sample_sizes(field.field, draws, seed, effort=BRIEF)
         drawn = field.coefficients(sizes.noise, sizes.families, random)

@@ -342,21 +342,23 @@ def simulate(
 
 
 def compensate(
-    job: Path = job_folder(..., "Job folder with [machine] error_map."),
+    job: Path = job_folder(..., "Job folder with [machine] error_map, or rotary_errors."),
     out: Path = option(..., "Folder for the compensated job.", "DIR"),
     extrapolate: bool = option(False, "Extrapolate beyond the maps, and flag those points."),
     map_text: float | None = option(
         None, "Also write the error map at this temperature, in °C, in the contractors' text form.", "T", "not written"),
     cloud: Path | None = option(
-        None, "Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
+        None, "Cloud of a digitizer, or of rotary axes, to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
         "the job's recording"),
-    new_map: bool = option(False, "Write instead an error map of all errors that the job's recording shows."),
+    new_map: bool = option(
+        False, "Write instead an error map of all errors that the job's recording shows; with rotary axes a file of them."),
     controller: str = option(
         "", "Write instead tables of runs that position axes, for a controller: linuxcnc, sinumerik, twincat, or a file that "
         "is a jinja2 template of your own.", "FORM", "not written"),
     end: Ending = opt.FORCED,
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own, or make a map or tables of one."""
+    from cmm_uq.analysis.machine.correction import FieldMap
     from cmm_uq.app.commands.jobs import compensate as corrected, controller as tables
     from cmm_uq.machine.physics.map_interpolation import Beyond
 
@@ -367,7 +369,8 @@ def compensate(
             raise CmmUqError(problem, fix="Leave out one of them")
         with end.progress() as stage:
             files, found = corrected.write_new_map(job, out, force=end.force, stage=stage)
-        what = f"An error map of all errors that the recording of {job} shows"
+        kind = "An error map" if isinstance(found, FieldMap) else "A file"
+        what = f"{kind} of all errors that the recording of {job} shows"
         conclude_derived(files, what, end, is_job=False, remarks=corrected.worth_of(found))
         return
     if controller:
@@ -385,5 +388,5 @@ def compensate(
         with end.progress() as stage:
             tell = partial(stage, f"Compensating {cloud.name}")
             files = corrected.write_compensated_cloud(job, cloud, out, beyond=beyond, force=end.force, progress=tell)
-    what = f"{'The recording' if cloud is None else cloud.name} of {job}, compensated by its error maps"
+    what = f"{'The recording' if cloud is None else cloud.name} of {job}, compensated by the errors of its machine"
     conclude_derived(files, what, end, is_job=cloud is None)

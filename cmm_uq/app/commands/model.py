@@ -277,7 +277,7 @@ def _rms_um(values: Floats) -> float:
 
 
 def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedErrors:
-    from cmm_uq.machine.physics.compensation import circumstances, compensate_points, machine_compensation
+    from cmm_uq.machine.physics.compensation import Compensation, circumstances, compensate_points, machine_compensation
     from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 
     where = f"job.toml {KEY} map"
@@ -290,8 +290,12 @@ def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedError
         raise CmmUqError(error.problem, where=at, fix=error.fix) from error
     exact, when = np.zeros(len(points)), circumstances(points)
     beyond = replace(compensation, beyond="extrapolate")
+
+    def shown(by: Compensation, readings: Floats) -> Floats:
+        return -points.on_artefact(by.error_at(readings, when)[0][:, :, None])[:, :, 0]
+
     otherwise = {
-        name: (title, -replace(beyond, maps=ErrorMaps(read)).error(points.xyz, when)[0])
+        name: (title, shown(replace(beyond, maps=ErrorMaps(read)), points.carriages))
         for name, (title, read) in tables_otherwise(maps).items()
     }
     return PredictedErrors(
@@ -302,7 +306,7 @@ def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedError
         0.0,
         0,
         tables=otherwise,
-        at=lambda readings: -beyond.error(readings - points.machine.origin_mm, when)[0],
+        at=lambda readings: shown(beyond, readings),
     )
 
 

@@ -24,7 +24,14 @@ from cmm_uq.base.files.table import (
     required,
 )
 from cmm_uq.jobs.tables.arm import MOST_JOINTS, ArmFacts, JointFacts
-from cmm_uq.jobs.tables.rotary_axes import HeadFacts, RotaryFacts, RotaryTableFacts, check_carriages, rotary_problems
+from cmm_uq.jobs.tables.rotary_axes import (
+    HeadFacts,
+    RotaryErrorsFile,
+    RotaryFacts,
+    RotaryTableFacts,
+    check_carriages,
+    rotary_problems,
+)
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -267,6 +274,9 @@ class MachineFacts(JobTable):
     error_map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_of_all_or_none)] = []
     """Error maps of the machine; several are interpolated by the temperature of the scales."""
     squareness_arcsec: SquarenessFacts | None = key(None, "Squareness of the axes beside an error map.")
+    rotary_errors: RotaryErrorsFile | None = key(
+        None, "Errors of a machine with rotary axes, beside maps of its carriages."
+    )
     temperature_log: TemperatureLogFile | None = None
     """What the scales' thermocouples showed while the recording was made."""
     digitizer: DigitizerFacts | None = key(None, "A laser digitizer on the ram.")
@@ -280,6 +290,8 @@ class MachineFacts(JobTable):
             yield f"squareness_arcsec is given for the machine and for the map {file!r}: leave out one of the two"
         check_carriages(self.chain)
         yield from rotary_problems(self.chain, self.rotary, self.table, self.head)
+        if self.rotary_errors and not set(self.chain) & set("-|"):
+            yield "rotary_errors are of a machine with rotary axes: name an error_map, or mend the chain"
         own = _OF_ARMS if self.joint else _OF_ARMS | {"origin_mm"}
         if self.is_arm and (wrong := sorted(self.model_fields_set - own)):
             an_arm = "[[machine.joint]]" if self.joint else "[machine.arm]"
@@ -303,6 +315,11 @@ class MachineFacts(JobTable):
             yield "no [[machine.joint]] has a length, and the tool is on the last: give a_mm and d_mm of its rows"
         if not self.joint and self.arm.model_fields_set - ({"reach_mm", "up"} if self.is_arm else set()):
             yield "[machine.arm] is of an arm: give its rows, [[machine.joint]], or of one whose joints are not read reach_mm"
+
+    @property
+    def corrections(self) -> tuple[ErrorMapFile | RotaryErrorsFile, ...]:
+        """What the machine is corrected by."""
+        return (*self.error_map, *([self.rotary_errors] if self.rotary_errors else []))
 
     @property
     def is_arm(self) -> bool:

@@ -74,6 +74,13 @@ class HeadFacts(JobTable):
     carriages."""
 
 
+class RotaryErrorsFile(JobTable):
+    """``rotary_errors``: errors of a machine with rotary axes, by which `cmm-uq compensate` corrects it."""
+
+    file: str = required("CSV of the coefficients of each effect, as `compensate --new-map` writes it.")
+    covariance: str = required("Factor F of their covariance F·Fᵀ, the `.npy` file beside it.")
+
+
 def rotary_problems(
     chain: str, rotary: Sequence[RotaryFacts], table: RotaryTableFacts, head: HeadFacts
 ) -> Iterator[str]:

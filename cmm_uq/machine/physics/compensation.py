@@ -18,6 +18,7 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.physics.kinematics import KinematicChain, exact, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
+from cmm_uq.machine.physics.rotary_errors import RotaryErrors
 from cmm_uq.maths.geometry import Plane, fit_plane
 
 SETTLED = 1e-10  # change of a coordinate, mm, at which the inverse is found
@@ -58,7 +59,10 @@ class Compensation:
 
     def error(self, indicated: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """Error e (n, 3) in mm of indicated coordinates (n, 3), mm, and which points (n,) were extrapolated."""
-        readings = indicated + np.asarray(self.origin)
+        return self.error_at(indicated + np.asarray(self.origin), when)
+
+    def error_at(self, readings: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
+        """The same of scale readings (n, 3), mm, of the carriages."""
         form = exact if self.rigid else on_leaning_axes
         e, extrapolated = np.empty(readings.shape), np.empty(len(readings), dtype=bool)
         for start in range(0, len(readings), BLOCK):
@@ -106,13 +110,19 @@ class Compensation:
         }  # fmt: skip
 
 
-def compensate_points(points: Points, compensation: Compensation) -> Points:
+def compensate_points(points: Points, compensation: Compensation | None, rotary: RotaryErrors | None = None) -> Points:
     """A recording at its true coordinates, with tip offsets and temperatures of the scales where it has their columns.
 
-    Points beyond the maps, where they are allowed, are marked by 1 in the column ``extrapolated``.
+    Maps are of the carriages, wherever rotary axes stand; ``rotary`` errors add to theirs. Points beyond the maps, where they
+    are allowed, are marked by 1 in the column ``extrapolated``.
     """
-    xyz, extrapolated = compensation.compensate(points.xyz, circumstances(points))
-    marked = {"extrapolated": extrapolated.astype(np.float64)} if extrapolated.any() else {}
+    xyz, marked = points.xyz, dict[str, Floats]()
+    if compensation is not None:
+        e, extrapolated = compensation.error_at(points.carriages, circumstances(points))
+        xyz = xyz + points.on_artefact(e[:, :, None])[:, :, 0]
+        marked = {"extrapolated": extrapolated.astype(np.float64)} if extrapolated.any() else {}
+    if rotary is not None:
+        xyz = xyz + rotary.errors(points)
     return replace(points, xyz=xyz, columns={**points.columns, **marked})
 
 

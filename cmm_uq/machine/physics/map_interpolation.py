@@ -262,12 +262,21 @@ class MapCovariance:
         return u
 
     def of_distances(self, root: Floats, xyz: Floats, pairs: tuple[Ints, Ints]) -> Floats:
-        """Standard uncertainty (p,), mm, of distances between points (n, 3), mm, by R (n, 3, r) and p pairs of their rows."""
-        first, second = pairs
-        apart = xyz[second] - xyz[first]
-        d = apart / np.linalg.norm(apart, axis=1, keepdims=True)
-        common = np.einsum("pa,par->pr", d, root[second] - root[first])
-        return np.asarray(np.sqrt(np.sum(common**2, axis=1) + 2 * np.sum((d * self.beside) ** 2, axis=1)))
+        """As :func:`of_distances`, by R (n, 3, r)."""
+        return of_distances(root, np.broadcast_to(np.diag(self.beside), (len(xyz), 3, 3)), xyz, pairs)
+
+
+def of_distances(root: Floats, beside: Floats, xyz: Floats, pairs: tuple[Ints, Ints]) -> Floats:
+    """Standard uncertainty (p,), mm, of distances between points (n, 3), mm, of which p pairs of rows are given.
+
+    ``root``: R (n, 3, r) of what all points share, R·Rᵀ its covariance; ``beside``: (n, 3, b) the same of each point alone.
+    """
+    first, second = pairs
+    apart = xyz[second] - xyz[first]
+    d = apart / np.linalg.norm(apart, axis=1, keepdims=True)
+    common = np.einsum("pa,par->pr", d, root[second] - root[first])
+    alone = sum(np.sum(np.einsum("pa,pab->pb", d, beside[end]) ** 2, axis=1) for end in pairs)
+    return np.asarray(np.sqrt(np.sum(common**2, axis=1) + alone))
 
 
 def figure_units(error_map: ErrorMap) -> Floats:
@@ -278,16 +287,25 @@ def figure_units(error_map: ErrorMap) -> Floats:
 
 def covariance_file(covariance: MapCovariance, error_map: ErrorMap) -> bytes:
     """Content of an ``.npy`` file of the factor, µm and ″."""
+    return factor_file(covariance.factor / figure_units(error_map)[:, None])
+
+
+def factor_file(factor: Floats) -> bytes:
     file = io.BytesIO()
-    np.save(file, covariance.factor / figure_units(error_map)[:, None], allow_pickle=False)
+    np.save(file, np.ascontiguousarray(factor), allow_pickle=False)
     return file.getvalue()
 
 
 def parse_covariance(content: bytes, where: str, error_map: ErrorMap, beside: Floats) -> MapCovariance:
     """The covariance of a map, of the content of a file as :func:`covariance_file` writes it; ``beside``: (3,) mm."""
-    units = figure_units(error_map)
-    rows = len(units)
-    fix = "Give the factor F of the covariance F·Fᵀ as an .npy file of 64-bit floats, (figures of the map, columns), µm and ″"
+    units, name = figure_units(error_map), f"the map {error_map.source}"
+    factor = factor_of(content, where, len(units), f"{name} has {len(units)} figures with its squareness", "map")
+    return MapCovariance(factor * units[:, None], beside)
+
+
+def factor_of(content: bytes, where: str, rows: int, whose: str, of: str) -> Floats:
+    """(rows, r) of an ``.npy`` file that holds the factor of a covariance."""
+    fix = f"Give the factor F of the covariance F·Fᵀ as an .npy file of 64-bit floats, (figures of the {of}, columns)"
     file = io.BytesIO(content)
     try:
         version = np.lib.format.read_magic(file)
@@ -300,8 +318,8 @@ def parse_covariance(content: bytes, where: str, error_map: ErrorMap, beside: Fl
     if kind != np.dtype("<f8") or fortran or len(shape) != 2:
         raise CmmUqError(f"holds an array {shape} of {kind}, not rows of 64-bit floats", where=where, fix=fix)
     if shape[0] != rows:
-        problem = f"has {shape[0]} rows, the map {error_map.source} has {rows} figures with its squareness"
-        raise CmmUqError(problem, where=where, fix="Name the map that the covariance was written with")
+        problem = f"has {shape[0]} rows, {whose}"
+        raise CmmUqError(problem, where=where, fix=f"Name the {of} that the covariance was written with")
     if not 1 <= shape[1] <= _WIDEST or len(values) != 8 * rows * shape[1]:
         problem = f"{len(values)} bytes hold no {rows} × {shape[1]} numbers"
         raise CmmUqError(problem, where=where, fix=f"Write the file again; a factor has 1 to {_WIDEST} columns")
@@ -311,7 +329,7 @@ def parse_covariance(content: bytes, where: str, error_map: ErrorMap, beside: Fl
         raise CmmUqError(
             f"row {row + 1}, column {column + 1} is no finite number", where=where, fix="Write the file again"
         )
-    return MapCovariance(factor * units[:, None], beside)
+    return factor
 
 
 def uncertain_map(maps: Sequence[ErrorMap]) -> tuple[ErrorMap, MapCovariance] | None:
@@ -325,30 +343,46 @@ class SampledPoints:
 
     def __init__(self, most: int) -> None:
         self._most, self._every, self._seen = most, 1, 0
-        self._rows: list[Floats] = []  # readings, coordinates and tip of each that is kept, (9,)
+        self._rows: list[Floats] = []
 
     def add(self, readings: Floats, xyz: Floats, tip: Floats | None = None) -> None:
         """Points (n, 3), mm, where the scales stood and where they are; ``tip``: see :func:`kinematics.carried_offset`."""
-        tips = np.broadcast_to(np.zeros(3) if tip is None else tip, xyz.shape)
-        for i in range(-self._seen % self._every, len(xyz), self._every):
-            self._rows.append(np.concatenate([readings[i], xyz[i], tips[i]]))
-        self._seen += len(xyz)
+        self.keep(np.hstack([readings, xyz, np.broadcast_to(np.zeros(3) if tip is None else tip, xyz.shape)]))
+
+    def keep(self, rows: Floats) -> None:
+        """Some of rows (n, k) that say all of a point each."""
+        self._rows += list(rows[-self._seen % self._every :: self._every])
+        self._seen += len(rows)
         while len(self._rows) > self._most:
             self._rows, self._every = self._rows[::2], 2 * self._every
 
+    @property
+    def kept(self) -> Floats:
+        return np.array(self._rows)
+
     def distances(self, error_map: ErrorMap, covariance: MapCovariance, chain: str | KinematicChain) -> list[Figures]:
-        """Standard uncertainty, µm, of distances between them, for eighths of their pairs from the shortest on."""
+        """Standard uncertainty, µm, of distances between them; see :func:`uncertain_distances`."""
         if len(self._rows) < 2:
             return []
-        readings, xyz, tip = np.hsplit(np.array(self._rows), 3)
-        first, second = np.triu_indices(len(xyz), 1)
-        lengths = np.linalg.norm(xyz[second] - xyz[first], axis=1)
-        apart = lengths > 0
-        first, second, lengths = first[apart], second[apart], lengths[apart]
+        readings, xyz, tip = np.hsplit(self.kept, 3)
         root = covariance.root(error_map, readings, tip=tip, chain=chain)
-        found = []
-        for part in np.array_split(np.argsort(lengths, kind="stable"), min(8, len(lengths))):
-            u = covariance.of_distances(root, xyz, (first[part], second[part])) / MICROMETRE
-            of = {"up_to_mm": lengths[part[-1]], "u_um": np.median(u), "largest_u_um": u.max()}
-            found.append({name: float(f"{value:.4g}") for name, value in of.items()})
-        return found
+        return uncertain_distances(root, np.broadcast_to(np.diag(covariance.beside), (len(xyz), 3, 3)), xyz)
+
+
+def uncertain_distances(root: Floats, beside: Floats, xyz: Floats) -> list[Figures]:
+    """Standard uncertainty, µm, of distances between points, for eighths of their pairs from the shortest on.
+
+    Parameters as :func:`of_distances`.
+    """
+    first, second = np.triu_indices(len(xyz), 1)
+    lengths = np.linalg.norm(xyz[second] - xyz[first], axis=1)
+    apart = lengths > 0
+    first, second, lengths = first[apart], second[apart], lengths[apart]
+    found = []
+    for part in np.array_split(np.argsort(lengths, kind="stable"), min(8, len(lengths)) or 1):
+        if not len(part):
+            continue
+        u = of_distances(root, beside, xyz, (first[part], second[part])) / MICROMETRE
+        of = {"up_to_mm": lengths[part[-1]], "u_um": np.median(u), "largest_u_um": u.max()}
+        found.append({name: float(f"{value:.4g}") for name, value in of.items()})
+    return found

@@ -1,4 +1,4 @@
-"""Recordings and clouds of a digitizer, corrected by their machine's error maps."""
+"""Recordings and clouds, corrected by their machine's error maps, or by the errors of its rotary axes."""
 
 from __future__ import annotations
 
@@ -12,9 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.analysis.machine.correction import FieldMap, field_map
+from cmm_uq.analysis.machine.rotary_correction import RotaryCorrection
 from cmm_uq.analysis.machine.state import of_machine
 from cmm_uq.app.commands.certificates.further import together_of
 from cmm_uq.app.commands.files import Stage, silent
+from cmm_uq.app.commands.jobs.compensate_rotary import (
+    ROTARY_FILES,
+    RotaryCloud,
+    RotaryCompensation,
+    error_files,
+    errors_found,
+    in_words,
+    worth_data,
+    worth_in_words,
+)
 from cmm_uq.app.commands.jobs.simulate import recording
 from cmm_uq.app.commands.model import refuse_planned
 from cmm_uq.app.commands.reading import job_of, read_job, read_machine
@@ -23,6 +34,7 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import Owner, sha256_of, staged
 from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import FurtherCertificates, further_data
 from cmm_uq.certificate.result import Result
@@ -34,7 +46,7 @@ from cmm_uq.jobs.reports import DescribedDigitizer, digitizer_of
 from cmm_uq.jobs.source import sha256
 from cmm_uq.jobs.tables.identification import SIMULATED, first_line
 from cmm_uq.machine.model.predicted_errors import maps_of
-from cmm_uq.machine.physics.compensation import Compensation, circumstances, compensate_points, machine_compensation
+from cmm_uq.machine.physics.compensation import Compensation, machine_compensation
 from cmm_uq.machine.physics.digitizer import POSE, DigitizedCloud, Digitizer, columns_for
 from cmm_uq.machine.physics.error_map import ErrorMap, error_map_csv, error_map_text
 from cmm_uq.machine.physics.kinematics import euler_313
@@ -51,7 +63,6 @@ from cmm_uq.machine.physics.stated import physics_of
 
 NEW_MAP, COVARIANCE, MAP_KEYS = "error-map.csv", "error-map-covariance.npy", "error-map.toml"
 POINTS_U = "points-u.csv"  # standard uncertainties of corrected coordinates
-_LITTLE = 0.5  # part of the error that a map leaves from which on it corrects little
 PROVENANCE = "compensation.json"  # how the coordinates were corrected, in the folder of a compensated job
 
 
@@ -60,16 +71,15 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
 
     ``beyond``: ``refuse`` points outside the maps, or extrapolate and flag them.
     """
-    maps = maps_of(job)
     refuse_planned(job)
+    compensation = RotaryCompensation.of(job, beyond)
     _refuse_map(job, job.points)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
     log = log_of(job.facts.machine, job.inputs, job.folder)
-    compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
     provenance = compensation.provenance()
     try:
-        points = compensate_points(_with_probe(job), compensation)
+        points = compensation.corrected(_prepared(job, compensation))
         if log is not None:  # which gave the temperatures of the scales
             times = job.points.columns["time_s"]
             provenance |= {"temperature_log": {
@@ -109,17 +119,22 @@ def write_compensated(
 
 def write_new_map(
     job: Path, out: Path, *, seed: int = 0, force: bool = False, stage: Stage = silent
-) -> tuple[dict[str, Path], FieldMap]:
+) -> tuple[dict[str, Path], FieldMap | RotaryCorrection]:
     """Write the error map of all errors that a calibration shows, its covariance, and what they are good for.
 
-    Returns and raises as :func:`~cmm_uq.app.commands.jobs.simulate.write_simulation`, and the map.
+    Of a machine with rotary axes the errors themselves. Returns and raises as
+    :func:`~cmm_uq.app.commands.jobs.simulate.write_simulation`, and what is written.
     """
     read = read_job(job)
     _refuse(read)
     refuse_planned(read)
     owner = Owner("compensate", read.facts.job.id, read.origin)
-    names = (NEW_MAP, COVARIANCE, MAP_KEYS, PROVENANCE)
-    with staged(out, owner, inputs=read.paths, force=force, expected=names) as place:
+    rotary = _is_rotary(read)
+    names = ROTARY_FILES if rotary else (NEW_MAP, COVARIANCE, MAP_KEYS)
+    with staged(out, owner, inputs=read.paths, force=force, expected=(*names, PROVENANCE)) as place:
+        if rotary:
+            errors = errors_found(read, seed, stage)
+            return place.write(error_files(read, errors, _made_of(read, "file of errors"), PROVENANCE)), errors
         stage("Estimating the errors", 0.0)
         result, kind = evaluate_job(read, seed=seed), kind_of(read)
         if not isinstance(result, Result) or not any(map(of_machine, result.model.effects)):
@@ -140,22 +155,11 @@ def write_new_map(
         return place.write(_map_files(read, found, together.told)), found
 
 
-def worth_of(found: FieldMap) -> list[str]:
+def worth_of(found: FieldMap | RotaryCorrection) -> list[str]:
     """What a new map is good for, in sentences for who made it."""
-    (before, after), held = found.range_um, found.held_out
-    lines = [f"In the measuring range a coordinate is off by {before:.3g} µm rms, corrected by {after:.3g} µm"]
-    if after > _LITTLE * before:
-        lines.append("The recording leaves most of that open: correct nothing by this map where it was not recorded")
-    if held is None:
-        lines.append("Too little is recorded to hold some of it out: what the map is worth was not tried")
-    else:
-        lines.append(
-            f"{str(held.unseen).capitalize()} held out are off by {held.uncorrected:.3g} µm rms (predicted: "
-            f"{held.predicted[0]:.3g}), corrected by {held.corrected:.3g} ({held.predicted[1]:.3g}), by the named errors "
-            f"alone {held.named:.3g}"
-        )
-        if held.corrected > held.uncorrected:
-            lines.append("The map makes them worse: correct nothing by it")
+    if isinstance(found, RotaryCorrection):
+        return in_words(found)
+    lines = worth_in_words("In the measuring range", found.range_um, found.held_out, "map")
     lines += [str(text) for text in readings_warnings(found.statements, {})]
     if found.omitted:
         lines.append(f"Neither in the map nor in its uncertainty: {', '.join(found.omitted)}")
@@ -164,7 +168,7 @@ def worth_of(found: FieldMap) -> list[str]:
 
 
 def _map_files(read: Job, found: FieldMap, further: FurtherCertificates) -> dict[str, bytes]:
-    error_map, held = found.error_map, found.held_out
+    error_map = found.error_map
     assert error_map.covariance is not None  # noqa: S101 - of its own making
     beside = [round(float(u) / MICROMETRE, 4) for u in error_map.covariance.beside]
     square = ", ".join(f"{pair} = {angle!r}" for pair, angle in error_map.squareness_arcsec.items())
@@ -172,19 +176,13 @@ def _map_files(read: Job, found: FieldMap, further: FurtherCertificates) -> dict
         f'error_map = [{{ file = "{NEW_MAP}", temperature_c = {error_map.temperature!r}, squareness_arcsec = {{ {square} }}, '
         f'covariance = "{COVARIANCE}", u_beside_um = {beside} }}]\n'
     )
-    both = ("uncorrected", "corrected")
-    tried = None
-    if held is not None:
-        errors = {"uncorrected": held.uncorrected, "named_errors": held.named, "corrected": held.corrected}
-        tried = {"left_out": str(held.unseen), **{name: _figure(error) for name, error in errors.items()}}
-        tried["predicted"] = dict(zip(both, map(_figure, held.predicted), strict=True))
     told = {
         "software": PROGRAM, "recording": read.origin, "inputs_sha256": sha256(read.inputs),
         "chain": read.facts.machine.chain,
         "sign": "true = indicated + e", "errors_not_in_it": list(found.omitted),
         **({"axes": readings_data(read.points.machine, found.statements)} if found.statements else {}),
         **further_data(further.each),
-        "range_rms_um": dict(zip(both, map(_figure, found.range_um), strict=True)), "held_out_rms_um": tried,
+        **worth_data(found.range_um, found.held_out),
     }  # fmt: skip
     return {
         NEW_MAP: (_made_of(read) + error_map_csv(error_map)).encode(),
@@ -194,19 +192,19 @@ def _map_files(read: Job, found: FieldMap, further: FurtherCertificates) -> dict
     }
 
 
-def _made_of(read: Job) -> str:
+def _is_rotary(read: Job) -> bool:
+    return isinstance(read.points.machine, RotaryMachine)
+
+
+def _made_of(read: Job, what: str = "error map") -> str:
     """The line that a new map begins with, by which the recording that it was made of is known."""
-    return f"# error map by {PROGRAM} of a {read.origin} recording, points {_digest(read.points)}; see {PROVENANCE}\n"
+    return f"# {what} by {PROGRAM} of a {read.origin} recording, points {_digest(read.points)}; see {PROVENANCE}\n"
 
 
 def _digest(points: Points) -> str:
     """Of the coordinates of a recording, whatever the order of its rows, their numbers and the form of its file."""
     xyz = np.round(points.xyz, 6) + 0.0  # no negative zeros
     return hashlib.sha256(np.ascontiguousarray(xyz[np.lexsort(xyz.T)]).tobytes()).hexdigest()
-
-
-def _figure(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def compensated_job(job: Job, *, beyond: Beyond = "refuse") -> Job:
@@ -230,7 +228,7 @@ def _refuse_map(job: Job, points: Points | None = None) -> None:
 
     Corrected by it, these would seem to have smaller errors than they have.
     """
-    for one in job.facts.machine.error_map:
+    for one in job.facts.machine.corrections:
         line, where = job.inputs[one.file].partition(b"\n")[0], str(job.folder / one.file)
         if b"of a simulated recording" in line and job.origin != SIMULATED:
             raise CmmUqError("was made of a simulated recording, and corrects no measured one", where=where,
@@ -243,18 +241,15 @@ def _refuse_map(job: Job, points: Points | None = None) -> None:
 def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, bytes]:
     """Every file of the compensated job; ``text`` are maps written in the contractors' form."""
     points, provenance = compensate_job(read, beyond=beyond)
-    compensation = machine_compensation(read.points, ErrorMaps(maps_of(read)), beyond=beyond)
-    if (stated := uncertain_map(compensation.maps.maps)) is not None:
-        probe = _with_probe(read)
-        readings, tip = probe.xyz + np.asarray(compensation.origin), circumstances(probe).tip
-        u = stated[1].standard_uncertainty(stated[0], readings, tip=tip, chain=compensation.chain) / MICROMETRE
+    compensation = RotaryCompensation.of(read, beyond)
+    if compensation.has_uncertainty:
+        probe = _prepared(read, compensation)
+        u = compensation.standard_uncertainty(probe) / MICROMETRE
         places = np.column_stack([points.measurement, points.point, points.repeat])
         lines = [f"{m},{p},{r},{x:.4f},{y:.4f},{z:.4f}" for (m, p, r), (x, y, z) in zip(places, u, strict=True)]
         heads = "measurement,point,repeat,u_x_um,u_y_um,u_z_um"
         text = {**text, POINTS_U: ("\n".join([heads, *lines]) + "\n").encode()}
-        sample = SampledPoints(200)
-        sample.add(readings, points.xyz, tip)
-        provenance["distances"] = sample.distances(*stated, compensation.chain)
+        provenance["distances"] = compensation.distances(probe, points.xyz)
     told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
     files = {
         **kept_inputs(read),
@@ -262,17 +257,19 @@ def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, by
         **text,
         PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
     }
-    toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
+    toml = derived_toml(
+        read, "compensate", files, without=("error_map", "squareness_arcsec", "rotary_errors", *IN_THE_RECORDING)
+    )
     return {"job.toml": toml, **files}
 
 
-def _with_probe(job: Job) -> Points:
+def _prepared(job: Job, compensation: RotaryCompensation) -> Points:
     """The recording, with tip offsets where its kind finds them from what it recorded."""
-    facts = job.facts.artefact
+    facts, points = job.facts.artefact, compensation.prepared(job.points, job.recording_path)
     if not facts.carries_probe or "tip_x_mm" in job.points.columns:
-        return job.points
+        return points
     tips = kind_of(job).observing("compensated")(facts, job.points, where=job.recording_path).tips()
-    return replace(job.points, columns={**job.points.columns, **tips})
+    return replace(points, columns={**points.columns, **tips})
 
 
 FORMS = (".csv", ".npy", ".parquet")  # endings of what is read and written; a folder of ``.npy`` files becomes one
@@ -285,7 +282,8 @@ def write_compensated_cloud(
     """Write the coordinates of a cloud, x, y, z in mm in the frame of the scales, and how they came about.
 
     job : of which ``[machine]`` names the error maps and describes the digitizer; its recording is not read.
-    cloud : columns u_mm, v_mm in the scan plane and scale readings d_mm, e_mm, f_mm; pose, time_s, temp_x_c … where needed.
+    cloud : columns u_mm, v_mm in the scan plane and scale readings d_mm, e_mm, f_mm; pose, time_s, temp_x_c … where needed. Of
+        a machine with rotary axes x_mm, y_mm, z_mm as in its recordings, and the angles.
     beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
     Returns and raises as :func:`~cmm_uq.app.commands.jobs.simulate.write_simulation`.
     """
@@ -294,26 +292,21 @@ def write_compensated_cloud(
     if cloud.suffix not in FORMS and not cloud.is_dir():
         raise CmmUqError("is no cloud by its ending", where=str(cloud), fix=f"Clouds are {', '.join(FORMS)}")
     _refuse_map(read)
-    maps = ErrorMaps(maps_of(read))
-    compensation = replace(machine_compensation(read.points, maps, beyond=beyond), origin=np.zeros(3))
-    chain, digitizer = _chain(read, cloud, compensation)
-    stated = uncertain_map(maps.maps)
-    transform = chain if stated is None else _WithUncertainty(chain, *stated)
+    transform, told = _of_rotary(read, cloud, beyond) if _is_rotary(read) else _of_digitizer(read, cloud, beyond)
     name = f"{cloud.stem}-compensated{'.npy' if cloud.is_dir() else cloud.suffix}"
     owner = Owner("compensate", read.facts.job.id, read.origin)
     inputs = (*read.paths, *files)
     with staged(out, owner, inputs=inputs, force=force, expected=(name, PROVENANCE)) as place:
         mark = first_line("compensate", PROGRAM, f"; see {PROVENANCE}")
-        count = transform_cloud(cloud, place.room(name), transform, columns=chain.columns, names=transform.names,
+        count = transform_cloud(cloud, place.room(name), transform, columns=transform.columns, names=transform.names,
                                 mark=mark, progress=progress)  # fmt: skip
-        machine = read.facts.machine
+        log = read.facts.machine.temperature_log
         told = {
             "software": PROGRAM, "origin": "compensated", "points": count,
             "inputs_sha256": sha256(read.inputs) | {file.name: sha256_of(file) for file in files},
-            "columns": list(chain.columns), **compensation.provenance(), "digitizer": digitizer.as_data(),
-            "temperature_log": machine.temperature_log.file if machine.temperature_log is not None else None,
+            "columns": list(transform.columns), **told, "temperature_log": log.file if log is not None else None,
         }  # fmt: skip
-        if isinstance(transform, _WithUncertainty):
+        if not isinstance(transform, DigitizedCloud):
             told["distances"] = transform.distances()
         return place.write({PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode()}, [name])
 
@@ -343,6 +336,27 @@ class _WithUncertainty:
 
     def distances(self) -> list[dict[str, float]]:
         return self._sample.distances(self._map, self._covariance, self._letters)
+
+
+def _of_rotary(read: Job, cloud: Path, beyond: Beyond) -> tuple[RotaryCloud, dict[str, object]]:
+    """How a cloud of a machine with rotary axes is corrected, and what is said of it."""
+    if read.facts.machine.digitizer is not None:
+        fix = "Leave it out, and give the cloud as x_mm, y_mm, z_mm with the angles"
+        what = "a digitizer on a machine with rotary axes is not described"
+        raise CmmUqError(what, where="job.toml [machine] digitizer", fix=fix)
+    compensation = RotaryCompensation.of(read, beyond)
+    return RotaryCloud(read, compensation, cloud_header(cloud), str(cloud)), compensation.provenance()
+
+
+def _of_digitizer(
+    read: Job, cloud: Path, beyond: Beyond
+) -> tuple[DigitizedCloud | _WithUncertainty, dict[str, object]]:
+    maps = ErrorMaps(maps_of(read))
+    compensation = replace(machine_compensation(read.points, maps, beyond=beyond), origin=np.zeros(3))
+    chain, digitizer = _chain(read, cloud, compensation)
+    stated = uncertain_map(maps.maps)
+    transform = chain if stated is None else _WithUncertainty(chain, *stated)
+    return transform, {**compensation.provenance(), "digitizer": digitizer.as_data()}
 
 
 def _chain(job: Job, cloud: Path, compensation: Compensation) -> tuple[DigitizedCloud, DescribedDigitizer]:
