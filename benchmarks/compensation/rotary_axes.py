@@ -67,4 +67,6 @@ if __name__ == "__main__":
         rms, held = np.sqrt(each[:, :3].mean(axis=0)), 100 * each[:, 3:].mean(axis=0)
         se = 100 * each[:, 3:].std(axis=0, ddof=1) / np.sqrt(len(each))
         print(f"{which}: {rms[0]:.2f} µm rms, corrected {rms[1]:.3f}, u {rms[2]:.3f}", end="; ")
-        print(f"in U {held[0]:.1f} ± {se[0]:.1f} % of coordinates, {held[1]:.1f} ± {se[1]:.1f} % of distances", flush=True)
+        print(
+            f"in U {held[0]:.1f} ± {se[0]:.1f} % of coordinates, {held[1]:.1f} ± {se[1]:.1f} % of distances", flush=True
+        )
