@@ -44,6 +44,8 @@ def recorded(job: Path, angles: Floats, *, machine: bool = False, spheres: Float
 
 
 THERE_AND_BACK = np.concatenate([OUT, OUT[-2::-1]])
+BESIDE = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 720.0])  # seven positions that are all but one
+TURNS = np.array([0.0, 180.0, 181.0, 360.0, 361.0, 540.0, 541.0, 720.0])
 
 
 @pytest.mark.parametrize("machine", [False, True])
@@ -91,6 +93,8 @@ def test_a_test_uncertainty_is_what_changed_between_the_positions(job: Path) -> 
     (OUT, SPHERES, "sphere A: 7 positions out and 0 back over 720°"),
     (np.concatenate([OUT[:7], OUT[5::-1]]), SPHERES, "6 positions out and 6 back over 617"),
     (0.5 * THERE_AND_BACK, SPHERES, "7 positions out and 7 back over 360°"),
+    (np.concatenate([BESIDE, BESIDE[-2::-1]]), SPHERES, "7 positions out and 7 back over 720°, 354° without"),
+    (np.concatenate([TURNS, TURNS[-2::-1]]), SPHERES, "7 positions out and 7 back over 720°, 179° without"),
     (THERE_AND_BACK, SPHERES[:1], "spheres A and B"),
     (THERE_AND_BACK, SPHERES * [[1, 1, 1], [-1, 1, 1]], "on opposite sides of the axis"),
     (THERE_AND_BACK, SPHERES * [[1, 1, 1], [0.7, 0.7, 1]], "at the same radius on opposite sides"),

@@ -7,7 +7,7 @@ this project's own. Places are those from the base of the arm, whose reach the j
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -132,7 +132,7 @@ def oriented(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
 def seats(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     """Ten readings in each of three seats: near the base, in the middle of the reach, and far out."""
     points, (reach, stated) = artefact.points, _reach(artefact)
-    whole = [own for own in _groups(points, recorded=recorded).values() if len(own) >= READINGS]
+    whole = [own for own in _groups(points, recorded=recorded).values() if len(_turned(points, own)) >= READINGS]
     away = [float(np.linalg.norm(points.machine_xyz[np.isin(points.group, own)].mean(axis=0))) / reach for own in whole]
     lacks = [
         say(
@@ -270,14 +270,8 @@ def twice_rms(test: Test) -> Statement:
     test.refuse_without_uncertainty(float(u.min()), "u_um")
     value, whole = (2 * float(np.sqrt(np.sum(x**2) / (own.sum() - 1))) for x in (found.errors[own] / MICROMETRE, u))
     length = float(found.lengths[own].mean())
-    item = test.decided(
-        value,
-        whole,
-        test.limit_um(length),
-        signed=False,
-        length_mm=length,
-        set_aside=bool(test.set_aside(found.rows[own]).any()),
-    )
+    aside, limit = bool(test.set_aside(found.rows[own]).any()), test.limit_um(length)
+    item = test.decided(value, whole, limit, signed=False, length_mm=length, set_aside=aside)
     what = say("u is twice the root mean square of those of the lengths, which no correlation of them exceeds.")
     remark = what if whole > 0 else NOT_STATED
     return test.stated(
@@ -300,30 +294,15 @@ def _of_sphere(
     *also: str,
 ) -> Characteristic:
     unstated = form_unstated if lines == FORM_LINES else length_unstated
-    return Characteristic(
-        name,
-        FORMS,
-        errors,
-        partial(spheres, plan, repeats, places),
-        unstated,
-        partial(diameter_allowed, plan=plan),
-        also,
-        lines=lines,
-    )
+    whole, allowed = partial(spheres, plan, repeats, places), partial(diameter_allowed, plan=plan)
+    return Characteristic(name, FORMS, errors, whole, unstated, allowed, also, lines=lines)
 
 
 def _lengths(name: str, both: bool) -> Characteristic:
     chosen = of_sides(both)
-    return Characteristic(
-        name,
-        LENGTHS,
-        partial(decided.errors_of_indication, chosen=chosen),
-        partial(arm_lengths, chosen),
-        length_unstated,
-        asks=_gauge if both else lambda test: (),
-        beside=supplemented if both else None,
-        lines=LENGTH_LINES,
-    )
+    errors, whole = partial(decided.errors_of_indication, chosen=chosen), partial(arm_lengths, chosen)
+    one = Characteristic(name, LENGTHS, errors, whole, length_unstated, lines=LENGTH_LINES)
+    return replace(one, asks=_gauge, beside=supplemented) if both else one
 
 
 _ISO_10360_12, _B89_4_22 = NAMES
@@ -377,8 +356,10 @@ CLAUSES = {
                "three times; each diameter against the certified one.", "nine points, three times: as commonly reported; the "
                "rest: this project", of=("effective diameter",)),
         Clause("articulation", say("single-point articulation"), "Ten readings of a seat in each of three zones, up to 20 %, "
-               "to 80 % and beyond 80 % of the reach; twice the standard deviation of the distances from their mean, n − 1, "
-               "and the largest distance.", "two standard deviations: a manufacturer's words; the rest: as commonly reported",
+               "to 80 % and beyond 80 % of the reach, each with some joint turned by 10° from every other where joints are "
+               "read, else that they differ is for the procedure; twice the standard deviation of the distances from their "
+               "mean, n − 1, and the largest distance.", "two standard deviations: a manufacturer's words; the rest: as "
+               "commonly reported",
                of=("SPAT", "SPAT maximum")),
         Clause("volumetric", say("volumetric performance"), "Twenty positions of two bars, of 50 to 75 % and of 120 to 150 % "
                "of the reach; each deviation, and twice their root mean square, n − 1.", REPORTED,

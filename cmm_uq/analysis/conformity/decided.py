@@ -94,13 +94,9 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Rem
         remarks.append(
             say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
         )
-    budget = length_budget(
-        float(found.lengths[named]),
-        float(found.u[named]),
-        REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]),
-        under,
-        0.0 if found.u_beside is None else float(found.u_beside[named]),
-    )
+    length, u, at = found.lengths[named], found.u[named], REFERENCE_TEMPERATURE if degrees is None else degrees[named]
+    beside = 0.0 if found.u_beside is None else float(found.u_beside[named])
+    budget = length_budget(float(length), float(u), float(at), under, beside)
     quantity, repeats = say("error of indication of length, worst against its limit"), again.repeats if again else None
     return test.stated(quantity, say("lengths"), items, remarks, causes=causes.of(rows), budget=budget, repeats=repeats)
 

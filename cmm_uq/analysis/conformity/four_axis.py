@@ -16,13 +16,14 @@ from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Test
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, Clause, Statement
 from cmm_uq.analysis.conformity.uncertainty import REPEAT_LINES, u_of_repeats
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.base.points import Points
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model.artefact import Artefact
 
 POSITIONS, TURN_DEG = 7, 720.0  # of the table in each sense, beside that at the start; and how far it turns
 _SAME, _ALIKE, _OPPOSITE = 0.01, 0.1, 30.0  # °; part of the radius; ° from opposite sides
+_GAP = 0.25  # of a turn, or of the travel where that is less, without a position, at most
 _TITLES = {
     "FR": say("radial four-axis error"),
     "FT": say("tangential four-axis error"),
@@ -77,10 +78,11 @@ def _lacking(points: Points, machine: RotaryMachine, number: int, *, recorded: b
         read = sphere.columns[axis.column][np.argsort(sphere.repeat, kind="stable")]
         steps = np.diff(read)
         senses = [int(np.sum(sense * steps > _SAME)) for sense in (1, -1)]
-        if min(senses) < POSITIONS or np.ptp(read) < far - _SAME or abs(read[0] - read[-1]) > _SAME:
+        gap, back = _widest(read, min(far, 360.0)), abs(read[0] - read[-1]) <= _SAME
+        if min(senses) < POSITIONS or np.ptp(read) < far - _SAME or not back or gap > _GAP * min(far, 360.0) + _SAME:
             yield say(
-                "measurement {number}, sphere {name}: {out} positions out and {back} back over {turn:g}°",
-                number=number, name=Verbatim(name), out=senses[0], back=senses[1], turn=float(np.ptp(read)),
+                "measurement {number}, sphere {name}: {out} positions out and {back} back over {turn:g}°, {gap:.0f}° without",
+                number=number, name=Verbatim(name), out=senses[0], back=senses[1], turn=float(np.ptp(read)), gap=gap,
             )  # fmt: skip
         if recorded and len(np.unique(sphere.xyz, axis=0)) < len(sphere):
             yield say("measurement {number}: centres that repeat another to the last digit", number=number)
@@ -93,6 +95,12 @@ def _lacking(points: Points, machine: RotaryMachine, number: int, *, recorded: b
         yield say("measurement {number}: spheres at the same radius on opposite sides of the axis", number=number)
     if abs(low[axis.about] - high[axis.about]) < _ALIKE * max(radii):
         yield say("measurement {number}: spheres at different heights", number=number)
+
+
+def _widest(read: Floats, turn: float) -> float:
+    """Widest part of the turn, °, or of a smaller travel, in which no position lies; a whole turn closes."""
+    there = np.sort(np.mod(read, 360.0) if turn >= 360.0 else read)
+    return float(np.diff(there, append=there[0] + 360.0 if turn >= 360.0 else there[-1]).max())
 
 
 CHARACTERISTICS = tuple(
@@ -130,8 +138,9 @@ CLAUSES = (
     ),
     Clause(
         "positions", say("positions of the table"),
-        "At 0, at seven more in one sense over 720° or all of the travel, and at seven back to the start.",
-        "seven, out and back: as commonly reported, not verified; 720°: this project, the stricter reading",
+        "At 0, at seven more in one sense over 720° or all of the travel, and at seven back to the start; "
+        "no quarter of a turn, or of the travel, without one.",
+        "seven, out and back: as commonly reported, not verified; 720°, a quarter: this project, the stricter reading",
     ),
     Clause("again", say("measuring again"), "Nothing is measured again.", CHOSEN),
     Clause(

@@ -245,16 +245,8 @@ def figure_of(
     figure = also[0] if also else name
     decides = partial(figure_error, figure=figure, title=title, what=what, lines=lines)
     of_length = lines == LENGTH_LINES
-    return Characteristic(
-        name,
-        figure,
-        decides,
-        conditions,
-        length_unstated if of_length else lambda artefact: None,
-        needs=None if of_length else "u_repeat_um",
-        lines=lines,
-        also=also,
-    )
+    one = Characteristic(name, figure, decides, conditions, length_unstated, lines=lines, also=also)
+    return one if of_length else replace(one, unstated=lambda artefact: None, needs="u_repeat_um")
 
 
 STANDARD = Standard(

@@ -332,7 +332,8 @@ def sphere_points(
     plan: SpherePlan, points: Points, directions: Floats, copies: Mapping[int, int]
 ) -> tuple[Condition, ...]:
     """How many points on each sphere, and whether they cover it; ``directions`` (n, 3) outward from its middle."""
-    wanted, reach, lacking, bare = plan.points, plan.reach_deg, list[Text](), list[Text]()
+    wanted, reach, lacking, bare, mixed = plan.points, plan.reach_deg, list[Text](), list[Text](), list[Text]()
+    tips = tip_offsets(points)
     for group, rows in enumerate(points.rows_of_groups):
         if group in copies:
             continue
@@ -344,9 +345,12 @@ def sphere_points(
         elif (gap := _farthest(directions[rows])) > reach:
             bare.append(say("points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
                             name=name, gap=gap))  # fmt: skip
+        if tips is not None and np.ptp(tips[rows], axis=0).max() > plans.OFFSET_TOLERANCE_MM:
+            mixed.append(say("one stylus on the sphere of {name}: tips of several were recorded", name=name))
     over = say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=reach)
     enough = say("{points} points over the sphere", points=wanted)
-    return Condition(enough, tuple(lacking)), Condition(over, tuple(bare))
+    single = Condition(say("one stylus on each sphere"), tuple(mixed))
+    return Condition(enough, tuple(lacking)), Condition(over, tuple(bare)), *([single] if mixed else ())
 
 
 def _farthest(normals: Floats) -> float:

@@ -18,6 +18,7 @@ from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Cla
 from cmm_uq.base.messages import Message, Text, Verbatim, at_key, commas, say
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import METRE, MICROMETRE
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import POSITIONING
@@ -30,6 +31,7 @@ _DRAWS = 2000
 _DOF = 4
 REPEATS, LEAST_TARGETS, PER_METRE = 5, 5, 5.0  # runs in each direction, targets (ISO 230-2:2014, of axes up to 2 m)
 DIAGONALS, _MOVES, _MOST = 4, 0.1, 2 / 3  # least cosine with each axis, and part of its travel that each crosses
+_UNEVEN = 2.0  # times the spacing of as few even targets as are asked for, that two of them lie apart at most
 _APART = 5.0  # degrees between targets of a circle, at most: a path that is recorded as it goes has no targets
 _TITLES = {
     "A": say("bidirectional accuracy of positioning"), "E": say("bidirectional systematic deviation of positioning"),
@@ -155,12 +157,8 @@ def _short_of_travel(runs: Runs, artefact: Artefact) -> Iterator[Message]:
             key = at_key("[machine] travel_mm")
             yield say("the travel of {axis}{key}, of which its run is a part", axis=Verbatim(axis.upper()), key=key)
         elif length < _MOST * travel[axis]:
-            yield say(
-                "two thirds of the travel of {axis} ({length:.0f} of {travel:.0f} mm)",
-                axis=Verbatim(axis.upper()),
-                length=length,
-                travel=travel[axis],
-            )
+            of = {"axis": Verbatim(axis.upper()), "length": length, "travel": travel[axis]}
+            yield say("two thirds of the travel of {axis} ({length:.0f} of {travel:.0f} mm)", **of)
 
 
 def _named(runs: Runs) -> list[str]:
@@ -180,7 +178,13 @@ def _not_measured(runs: Runs) -> list[Text]:
 def _enough(run: PositioningRuns) -> bool:
     if isinstance(run, CircularTest):
         return run.both and run.widest_gap <= _APART
-    return run.repeats >= REPEATS and len(run.targets) >= max(LEAST_TARGETS, PER_METRE * run.length_mm / METRE)
+    least = max(LEAST_TARGETS, PER_METRE * run.length_mm / METRE)
+    return run.repeats >= REPEATS and len(run.targets) >= least and _bare(run) * (least - 1) <= _UNEVEN * (1 + 1e-9)
+
+
+def _bare(run: PositioningRuns) -> float:
+    """Widest part of a run without a target, of all of it."""
+    return float(np.diff(run.targets).max(initial=0.0)) / max(float(np.ptp(run.targets)), 1e-9)
 
 
 def conditions(
@@ -198,46 +202,35 @@ def conditions(
         few += [say("{count} of the four body diagonals", count=count)] if count < DIAGONALS else []
     few += list(_short_of_travel(runs, artefact)) if of is axes else []
     for number, run in runs.items():
-        count = len(run.targets)
         if not _enough(run):
             few.append(
                 say(
-                    "measurement {number}: {repeats} runs, {targets} targets",
+                    "measurement {number}: {repeats} runs, {targets} targets, {bare:.0f} % of the run without one",
                     number=number,
                     repeats=run.repeats,
-                    targets=count,
+                    targets=len(run.targets),
+                    bare=100 * _bare(run),
                 )
             )
         if recorded and run.both and np.array_equal(run.x[0], run.x[1]):
             few.append(say("measurement {number}: both directions are the same to the last digit", number=number))
         alike = np.all(run.x[..., :, None] == run.x[..., None, :], axis=(0, 1)) & ~np.eye(run.repeats, dtype=bool)
         if recorded and alike.any():
-            first, second = np.argwhere(alike)[0] + 1
-            few.append(
-                say(
-                    "measurement {number}: repeat {second} is repeat {first} to the last digit",
-                    number=number,
-                    second=int(second),
-                    first=int(first),
-                )
-            )
+            first, second = (np.argwhere(alike)[0] + 1).tolist()
+            same = {"number": number, "first": first, "second": second}
+            few.append(say("measurement {number}: repeat {second} is repeat {first} to the last digit", **same))
     return (Condition(what, tuple(few) if runs else (what,)),)
 
 
 def _characteristics(
     names: Sequence[str], of: Callable[[Artefact], Runs], what: str, asked: Text, key: str
 ) -> tuple[Characteristic, ...]:
-    return tuple(
-        Characteristic(
-            name,
-            POSITIONING,
-            partial(positioning, figure=name, of=of, what=what, key=key),
-            partial(conditions, of=of, what=asked),
-            lines=LINES,
-            unstated=lambda artefact: None if not key or getattr(artefact, key, None) else key,
-        )
-        for name in names
-    )
+    def unstated(artefact: ArtefactFacts) -> str | None:
+        return None if not key or getattr(artefact, key, None) else key
+
+    decides, whole = partial(positioning, of=of, what=what, key=key), partial(conditions, of=of, what=asked)
+    each = ((name, POSITIONING, partial(decides, figure=name), whole, unstated) for name in names)
+    return tuple(Characteristic(*one, lines=LINES) for one in each)
 
 
 _RUNS = say("five runs in each direction, five targets a metre and five at least, over two thirds of the travel")
@@ -272,8 +265,9 @@ _ISO_230_2 = (
     Clause(
         "targets_and_runs", say("targets and runs"),
         "Five runs in each direction; five targets a metre and five at least, the axis at rest at each: readings in motion "
-        "are not decided. Each axis over two thirds of its travel. That targets are not evenly spaced is not asked for.",
-        "as commonly reported; at rest: GOST ISO 230-2-2016, its translation; two thirds: this project",
+        "are not decided. Each axis over two thirds of its travel, no two neighbours farther apart than twice the spacing of "
+        "as few even targets. That targets are not evenly spaced is not asked for.",
+        "as commonly reported; at rest: GOST ISO 230-2-2016, its translation; two thirds, twice: this project",
     ),
     Clause(
         "formulas", say("figures"), "A, E, R, B and M with twice the standard uncertainty estimators, n − 1.", REPORTED,

@@ -13,6 +13,7 @@ from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import Standard
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause
 from cmm_uq.analysis.conformity.uncertainty import LENGTH_LINES
+from cmm_uq.base.arm import Arm
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.artefact import Artefact
@@ -20,6 +21,9 @@ from cmm_uq.machine.model.artefact import Artefact
 NAME = "ISO 9283:1998"
 POSES, CYCLES = 5, 30
 _FLAT = 0.02  # of the extent of five poses, by which they may lie beside a plane, and one of them beside their middle
+# of their extent that of the narrower side at least, and of the reach, or the way from the base where that is not stated or
+# is longer, the extent itself: five poses on a line, or side by side, are none of a cube
+_NARROW, _NEAR = 0.3, 0.1
 
 
 def poses(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
@@ -35,8 +39,10 @@ def poses(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
             whole.setdefault(measurement, []).append(np.mean(each, axis=0))
     what = say("{poses} poses, each commanded {cycles} times", poses=POSES, cycles=CYCLES)
     found = [asked(what, POSES, max(map(len, whole.values()), default=0))]
-    plane = say("a pose in the middle of four others, all in one plane")
-    flat = any(_in_a_plane(five) for at in whole.values() for five in _fives(at))
+    plane = say("a pose in the middle of four others, all in one plane, over a tenth of the reach")
+    machine = points.machine
+    reach = machine.reach_mm if isinstance(machine, Arm) else np.nan
+    flat = any(_in_a_plane(five, reach) for at in whole.values() for five in _fives(at))
     found.append(Condition(plane, () if flat else (plane,)))
     return tuple(found)
 
@@ -47,9 +53,11 @@ def _fives(at: list[Floats]) -> Iterator[Floats]:
         yield from (np.array([five[i], *five[:i], *five[i + 1 :]]) for i in range(POSES))
 
 
-def _in_a_plane(at: Floats) -> bool:
-    off = np.linalg.norm(at[0] - at[1:].mean(axis=0)), np.linalg.svd(at - at.mean(axis=0))[1][2]
-    return bool(max(off) <= _FLAT * float(np.ptp(at, axis=0).max()))
+def _in_a_plane(at: Floats, reach: float) -> bool:
+    extent, sides = float(np.ptp(at, axis=0).max()), np.linalg.svd(at - at.mean(axis=0))[1]
+    off = max(np.linalg.norm(at[0] - at[1:].mean(axis=0)), sides[2])
+    wide = sides[1] >= _NARROW * sides[0] and extent >= _NEAR * np.fmax(reach, np.linalg.norm(at[0]))
+    return bool(wide and off <= _FLAT * extent)
 
 
 _AGAIN = "poses that were commanded again and again"
@@ -70,6 +78,7 @@ STANDARD = Standard(
             lines=LENGTH_LINES,
         ),
     ),
+    (say("Of positions alone: the orientation of a pose, and all else that ISO 9283 characterises, are not tested."),),
 )
 CLAUSES = (
     Clause(
@@ -91,9 +100,9 @@ CLAUSES = (
         "poses",
         say("poses and cycles"),
         "Five poses, one in the middle of the others, all in one plane (2 % of "
-        "their extent), thirty cycles. That the plane is that of the cube, and load, speed and warming up, are for the "
-        "procedure.",
-        "five, thirty: as commonly reported; 2 %: this project",
+        "their extent) and not on a line (30 %), over a tenth of the reach at least; thirty cycles. That the plane is that of "
+        "the cube, how large that is, and load, speed and warming up, are for the procedure.",
+        "five, thirty: as commonly reported; 2, 30 %, a tenth: this project",
     ),
     Clause(
         "frame",

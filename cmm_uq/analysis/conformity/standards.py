@@ -124,8 +124,9 @@ _ISO_10360_2 = (
 )  # fmt: skip
 _ISO_10360_5 = (
     Clause("scope", say("scope"), "Contacting probes, point by point.", "its publisher's abstract", True),
-    Clause("points", say("points on the sphere"), "25 on every sphere recorded, neither more nor fewer, all different.",
-           "25: names of the characteristics, and summaries of manufacturers; neither more nor fewer: this project"),
+    Clause("points", say("points on the sphere"), "25 different ones at least on every sphere recorded, by one stylus.",
+           "25: names of the characteristics, and summaries of manufacturers; that more do not hinder, and that a sphere has "
+           "one stylus: this project"),
     Clause("pattern", say("where on the sphere the points lie"), "No direction of the hemisphere is farther than 45° "
            "from the nearest point.", CHOSEN),
     Clause("sphere_size", say("size of the sphere"), "10 to 50 mm.", "Harris 2004, 2.6.3, of ISO 10360-2:2000; not less "

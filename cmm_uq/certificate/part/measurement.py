@@ -92,6 +92,7 @@ class CertificateStatus:
     further: tuple[FurtherCertificate, ...] = ()
     circular: bool = False  # whether an artefact of the calibration was certified on this very machine
     passed: tuple[PassedTest, ...] = ()
+    interim: bool = False  # whether it is an interim check, and no calibration
 
 
 @dataclass(frozen=True)

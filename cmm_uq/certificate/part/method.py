@@ -177,6 +177,8 @@ def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
         (what, say("Nothing is called conforming, for the job states no uncertainty of these: {what}.", what=what)),
         (of_part == MEASURED != standing.origin,
          say("Nothing is called conforming, for nobody measured the machine: its calibration is no measurement.")),
+        (standing.interim, say("Nothing is called conforming, for what states the machine is an interim check, and no "
+                               "calibration.")),
         (standing.circular, say("Nothing is called conforming, for the artefact that calibrated the machine was itself "
                                 "certified on that machine.")),
     ))  # fmt: skip

@@ -96,7 +96,12 @@ class MaximumPermissibleError(JobTable):
 
 def _as_table(given: Any) -> Any:
     """An error that is written as a formula, as the table that says the same."""
-    return mpe_of(given) if isinstance(given, str) else given
+    keys = mpe_of(given) if isinstance(given, str) else given
+    if keys is not given and (k := keys.get("k", 1.0)) < 1:
+        raise ValueError(
+            f"grows by {1000 / k:.4g} µm in a metre: L is in mm; L in m would be L/{1000 * k:g} for L/{k:g}"
+        )
+    return keys
 
 
 Permissible = Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
 
@@ -145,7 +146,23 @@ def test_poses_beside_a_plane_are_no_five_of_the_standard() -> None:
     seen = {"reference_y_mm": artefact.points.columns["reference_y_mm"] + 60.0 * off}
     points = dataclasses.replace(artefact.points, xyz=xyz, columns={**artefact.points.columns, **seen})
     assert lacks(("ISO 9283:1998", "RP"), of_points(artefact, points)) == (
-        "a pose in the middle of four others, all in one plane",
+        "a pose in the middle of four others, all in one plane, over a tenth of the reach",
+    )
+
+
+@pytest.mark.parametrize(
+    "of", [lambda at: at * [1.0, 0.0, 0.0], lambda at: 0.05 * at], ids=["on a line", "side by side"]
+)
+def test_poses_on_a_line_or_side_by_side_are_none_of_a_cube(of: Callable[[np.ndarray], np.ndarray]) -> None:
+    """A robot repeats well where it hardly moves; five poses within 14 mm of 1 m, or on a line, made a whole test."""
+    artefact = ARMS["ISO 9283:1998", "RP"]("complete")[0]
+    points = artefact.points
+    middle = points.xyz[points.point == 1].mean(axis=0)
+    moved = middle + of(points.xyz - middle) - points.xyz
+    seen = {f"reference_{a}_mm": points.columns[f"reference_{a}_mm"] + moved[:, i] for i, a in enumerate("xyz")}
+    other = dataclasses.replace(points, xyz=points.xyz + moved, columns={**points.columns, **seen})
+    assert lacks(("ISO 9283:1998", "RP"), of_points(artefact, other)) == (
+        "a pose in the middle of four others, all in one plane, over a tenth of the reach",
     )
 
 
@@ -212,3 +229,15 @@ def test_orientations_differ_where_joints_were_read(degrees: float, lack: tuple[
     found = lacks(name, of_points(artefact, dataclasses.replace(points, machine=machine, columns=columns)))
     assert [any(words in text for text in found) for words in lack] == [True] * len(lack)
     assert lack or not found
+
+
+@pytest.mark.parametrize(("degrees", "whole"), [(12.0, True), (4.0, False)])
+def test_readings_of_a_seat_differ_where_joints_were_read(degrees: float, *, whole: bool) -> None:
+    """Ten readings without a move of the elbow are no articulation."""
+    name = ("ASME B89.4.22-2004", "SPAT")
+    artefact = ARMS[name]("complete")[0]
+    points = artefact.points
+    machine = Arm("a", rows=np.zeros((1, 5)), revolute=np.ones(1, dtype=bool), sense=np.ones(1), reach_mm=1000.0,
+                  limits=np.full((1, 2), np.nan))  # fmt: skip
+    other = dataclasses.replace(points, machine=machine, columns={**points.columns, "q1_deg": degrees * points.repeat})
+    assert (len(lacks(name, of_points(artefact, other))) == 0) == whole

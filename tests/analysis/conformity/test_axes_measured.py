@@ -51,6 +51,16 @@ def test_a_part_of_an_axis_is_no_test_of_it(longest: float, lacks: tuple[str, ..
     assert found.outcome == ("incomplete" if lacks else "pass")
 
 
+def test_targets_that_crowd_at_one_end_are_no_test_of_the_axis() -> None:
+    """Eight of nine targets within 60 mm of 800 mm: five a metre, and nothing seen of the middle."""
+    points = recorded(800.0)
+    crowded = np.where(points.xyz[:, 0] < 750.0, points.xyz[:, 0] / 12.0, points.xyz[:, 0])
+    found = decided(points.at(np.column_stack([crowded, points.xyz[:, 1:]])), UNDER)
+    assert (found.outcome, *map(str, found.missing)) == (
+        "incomplete", "measurement 1: 5 runs, 9 targets, 93 % of the run without one",
+    )  # fmt: skip
+
+
 def test_of_a_travel_that_nobody_states_no_part_is_known() -> None:
     found = decided(recorded(800.0, travel=np.full((3, 2), np.nan)), UNDER)
     assert found.outcome == "incomplete"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -79,6 +80,16 @@ def test_points_that_balance_each_other_are_looked_at_about_the_vertical() -> No
     assert abs(directions.mean(axis=0)).max() < 1e-9
     reached = {reach: sphere_points(SpherePlan(5, reach), points, directions, {})[1].met for reach in (72.0, 77.5)}
     assert reached == {72.0: False, 77.5: True}
+
+
+@pytest.mark.parametrize(("tip", "lack"), [(8.0, 0), (12.0, 1)])
+def test_a_sphere_probed_by_several_styli_is_no_test_of_one(tip: float, lack: int) -> None:
+    points, directions = recorded([X, Y, Z])
+    mixed = replace(points, columns={"tip_x_mm": np.array([0.0, 0.0, tip])})
+    found = [text for one in sphere_points(SpherePlan(3, 90.0), mixed, directions, {}) for text in one.missing]
+    assert found == ["one stylus on the sphere of measurement 3: tips of several were recorded"] * lack
+    same = replace(points, columns={"tip_x_mm": np.full(3, tip)})
+    assert all(one.met for one in sphere_points(SpherePlan(3, 90.0), same, directions, {}))
 
 
 def test_the_conditions_say_what_is_asked() -> None:

@@ -75,6 +75,14 @@ def test_the_k_of_a_guideline_that_writes_k_times_l_is_not_taken_for_l_over_k(st
         assert ConformityFacts.model_validate({"standard": standard, "mpe": meant}).mpe is not None
 
 
+@pytest.mark.parametrize("text", ["2.5 + L/0.3", "2.5 + 4·L/1", "min(2.5 + L/0.3; 60)"])
+def test_a_formula_with_l_in_metres_is_none(text: str) -> None:
+    """2.5 + L/0.3 of a data sheet that has L in m is 2.5 + L/300; taken in mm 20 mm had a limit of 69 µm."""
+    with pytest.raises(ValueError, match=r"µm in a metre: L is in mm; L in m would be L/"):
+        ConformityFacts.model_validate({"standard": "ISO 10360-2:2009", "mpe": text})
+    assert ConformityFacts.model_validate({"standard": "ISO 10360-2:2009", "mpe": "2.5 + L/1"}).mpe is not None
+
+
 def test_a_table_of_l_over_k_below_one_is_none() -> None:
     with pytest.raises(ValueError, match=r"2\.5e\+05 µm in a metre"):
         ConformityFacts.model_validate({"standard": "ISO 10360-2:2009", "mpe": {"a_um": 3.0, "k": 0.004}})

@@ -345,7 +345,7 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> CertificateSta
         serial=str(said.get("serial") or ""), origin=str(said["origin"]), date=date, age=on - date, valid_until=until,
         verdict=stated.verdict, checked=stated.checked, again=stated.again, trusted=trusted,
         draft=stated.job is not None and draft(stated.job),
-        given_recording=False, path=NOTHING, drift=NOTHING,
+        given_recording=False, path=NOTHING, drift=NOTHING, interim=bool(said.get("interim")),
         temperature_c=None if recorded is None else float(np.mean(recorded)),
         inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
         circular=own.certified_on_this_machine if own is not None else any(

@@ -408,6 +408,7 @@ def test_tips_whose_places_to_each_other_nobody_states_pass_nothing(offsets: lis
 
 @pytest.mark.parametrize(("standing", "lack"), [
     ({}, ""), ({"origin": "measured"}, ""), ({"origin": "measured", "circular": True}, "certified on that machine."),
+    ({"origin": "measured", "interim": True}, "and no calibration."),
     ({"origin": "simulated"}, "its calibration is no measurement."),
     ({"origin": "compensated"}, "its calibration is no measurement."),
 ])  # fmt: skip
@@ -433,6 +434,16 @@ def test_the_iotas_certificate_says_that_its_artefact_was_certified_on_it() -> N
     figures = plate_of({f"machine/{name}": inside[name] for name in ("results.json", "posterior.npz")}, **THERE)
     assert standing_of(figures, verified(figures)).circular
     assert not standing_of(plate_of(by_certificate()), verified(plate_of(by_certificate()))).circular
+
+
+def test_the_report_of_an_interim_check_is_known_as_one() -> None:
+    files = by_results()
+    results = next(name for name in files if name.endswith("results.json"))
+    said = json.loads(files[results])
+    for interim in (None, True):
+        said["job"]["interim"] = interim
+        part = plate_of({**files, results: as_json(said)}, **THERE)
+        assert standing_of(part, verified(part)).interim == bool(interim)
 
 
 def test_what_is_stated_and_declared_is_refused() -> None:
