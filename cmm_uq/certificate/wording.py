@@ -221,10 +221,8 @@ def stated_physics() -> tuple[tuple[Text, Text], ...]:
 
 def effect_title(name: str, own: Iterable[Effect] = ()) -> Text:
     """An effect in words; what is none, as it stands."""
-    effect = effect_of(name, own)
-    if effect is not None:
-        return effect.title
-    return name if isinstance(name, Text) else Verbatim(name)
+    effect, told = effect_of(name, own), name if isinstance(name, Text) else Verbatim(name)
+    return told if effect is None else effect.title
 
 
 def titles(names: Iterable[str], own: Iterable[Effect] = ()) -> list[Text]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields, replace
 
 import numpy as np
@@ -13,10 +14,12 @@ from cmm_uq.certificate.certificate import with_capability
 from cmm_uq.certificate.document import Paragraph, Table
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.contents import _identifiability
+from cmm_uq.certificate.sections.method import method
 from cmm_uq.certificate.sections.regions import over_range, regions_data, regions_section, regions_warnings
 from cmm_uq.certificate.sections.results import error_factors
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.simulated import analysed, outcome
+from tests.conftest import ROOT
 
 JOB = "iota-1102-20C"
 KEY = ("scale_x", "ppm")
@@ -165,3 +168,11 @@ def test_results_have_what_the_page_has() -> None:
     assert data["of_priors"] == [".".join(key) for key in regions().whole]
     assert {row["family"] for row in data["families"]} == set(regions().scales)
     assert all(len(row["u_ratio"]) == len(data["of_priors"]) for row in data["priors"])
+
+
+def test_the_method_names_where_its_equations_and_their_trials_stand() -> None:
+    paragraph = method(analysed(JOB)).blocks[0]
+    assert isinstance(paragraph, Paragraph)
+    pages = re.findall(r"docs/\S+\.md", str(paragraph.text))
+    assert len(pages) == 4
+    assert all((ROOT / page).is_file() for page in pages)

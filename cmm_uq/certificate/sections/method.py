@@ -120,7 +120,8 @@ def method(result: Result) -> Section:
     text = say(
         "{what} are estimated from the observations with a linear measurement model, by least squares (orthogonal "
         "factorisation) and as a posterior distribution with priors as wide as physics allows; {length}. The attached job, "
-        "recording and results.json suffice to run it again.",
+        "recording and results.json suffice to run it again. Equations: docs/certificate.md and docs/machine/field.md of the "
+        "program's source; how often such intervals hold: docs/coverage-study.md and docs/parts-study.md.",
         what=say("Error factors") if result.model.effects else say("The quantities sought"),
         length=say("the stated dimension of the artefact enters with its uncertainty") if certified else
         say("no stated dimension of the artefact enters"),
