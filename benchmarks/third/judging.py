@@ -51,6 +51,7 @@ class Judged:
     alarm: bool | None = None
     oracle_sees: bool | None = None
     oracle_sees_form: bool | None = None
+    oracle_finds: bool | None = None  # where it is, told the noise alone
     located: bool | None = None
     taken: tuple[float, float] | None = None  # part of the held-out rms that goes, here and by the oracle
     decided: bool | None = None  # whether the oracle names the form
@@ -94,6 +95,8 @@ def judged(found: Hidden, truth: Record, said: Record, oracle: Record) -> Judged
 
 def _judge_outside(one: Judged, found: Hidden, outside: Outside, said: Record, oracle: Record, fits: bool) -> Judged:
     one.oracle_sees, one.oracle_sees_form = oracle["p_covariate"] <= 0.01, oracle["p_form"] <= 0.01
+    if "p_anywhere" in oracle:
+        one.oracle_finds = oracle["p_anywhere"] <= 0.01 and bool(set(outside.of) & set(oracle["best"]))
     one.located = said["verdict"] not in QUIET and (fits or bool(set(outside.of) & covariates(said)))
     before, after = held_out(said)
     taken = 1 - after / before if before > 0 else 0.0

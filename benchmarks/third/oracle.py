@@ -2,12 +2,14 @@
 
 It asks whether there is anything, told the form and not told it; what the true form predicts of set-ups that its fit had not
 seen; and the odds of the form against the others of the dictionary and against a smooth function. Every explanation has the
-same prior for what it makes visible. Nothing here comes from the package.
+same prior for what it makes visible. A second one is told the noise alone, as whoever has to search is at best: it asks where
+anything is. Nothing here comes from the package.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from scipy import special, stats
 from benchmarks.second.cases import baseline
 from benchmarks.second.oracle import searched
 from benchmarks.third.cases import Hidden
-from benchmarks.third.forms import DICTIONARY, TWO, Outside
+from benchmarks.third.forms import DICTIONARY, POSITIONS, TWO, Outside
 from benchmarks.third.known import rivals
 
 VISIBLE = (2.0, 5.0, 12.0, 30.0)
@@ -47,9 +49,11 @@ def told(found: Hidden, seed: int) -> dict[str, Any]:
     before, after = held_out(found, column_of(found, outside))
     log_odds, true = odds(found, y), outside.form
     others = {name: value for name, value in log_odds.items() if name != true}
+    anywhere, best = unformed(found, y, np.random.default_rng([seed, 78]), tuple(places(found)))
     return {
         "p_form": float(stats.chi2.sf((column @ y) ** 2 / (column @ column), 1)),
-        "p_covariate": unformed(found, y, np.random.default_rng([seed, 77])),
+        "p_covariate": unformed(found, y, np.random.default_rng([seed, 77]), (outside,))[0],
+        "p_anywhere": anywhere, "best": list(best.of),
         "heldout_before_um": before, "heldout_after_um": after,
         "log_odds": {name: float(log_odds.get(true, np.nan) - value) for name, value in others.items()},
         "log_evidence": {name: float(value) for name, value in log_odds.items()},
@@ -61,10 +65,22 @@ def column_of(found: Hidden, outside: Outside) -> np.ndarray:
     return found.seen.column(outside.error())
 
 
-def families(found: Hidden) -> Iterator[tuple[str, np.ndarray]]:
-    """Every form of the dictionary that its covariates may have: name, columns (m, members, c), whitened."""
-    outside = found.outside
-    assert outside is not None
+def places(found: Hidden) -> Iterator[Outside]:
+    """Whatever could be hidden, but for its form: covariates that vary, along each axis, where they may also lengthen it."""
+    true, context = found.one.placed.true, found.one.context
+    values = {name: true[:, i] for i, name in enumerate(POSITIONS)}
+    others = ("time_s", *(f"{kind}_{axis}{end}" for kind, end in (("temp", "_c"), ("approach", "")) for axis in "xyz"))
+    values |= {name: context[name] for name in others if name in context}
+    spans = {name: (float(each.min()), float(each.max())) for name, each in values.items()}
+    varying = [name for name, (low, high) in spans.items() if high - low >= 1e-6]
+    pairs = [each for each in combinations(POSITIONS, 2) if set(each) <= set(varying)]
+    for of, along in product([*((name,) for name in varying), *pairs], range(3)):
+        for scale in (False,) if of[0] in POSITIONS else (False, True):
+            yield Outside("", of, tuple(spans[name] for name in of), along, scale, {})
+
+
+def families(found: Hidden, outside: Outside) -> Iterator[tuple[str, np.ndarray]]:
+    """Every form of the dictionary that some covariates may have: name, columns (m, members, c), whitened."""
     each = [outside] if len(outside.of) == 1 else [outside.only(0), outside.only(1)]
     for form, (_, _, members) in DICTIONARY.items():
         if form in TWO:
@@ -143,30 +159,38 @@ def of_family(columns: np.ndarray, y: np.ndarray) -> float:
 
 def odds(found: Hidden, y: np.ndarray) -> dict[str, float]:
     """Log evidence of every form of the dictionary and of a smooth function, over nothing."""
-    said = {form: of_family(columns, y) for form, columns in families(found)}
+    assert found.outside is not None
+    said = {form: of_family(columns, y) for form, columns in families(found, found.outside)}
     each = [log_evidence(columns, y) for columns in smooth(found)]
     return said | {"smooth": float(special.logsumexp(each) - np.log(len(each))), "nothing": 0.0}
 
 
-def unformed(found: Hidden, y: np.ndarray, random: np.random.Generator) -> float:
-    """p-value of nothing, told the covariate and not the form: the most surprising form, or a sum of cosines, among draws."""
-    every = [_basis(columns[:, i]) for _, columns in families(found) for i in range(columns.shape[1])]
-    outside = found.outside
-    assert outside is not None
-    u = outside.covariates(found.one.placed.true, found.one.context)
-    plain = _acting(found, outside, [wave for wave, _ in _waves(u, PLAIN if len(u) == 1 else 4)])
-    every += [_basis(plain[:, :k]) for k in range(2, plain.shape[1] + 1, 2)]
+def unformed(
+    found: Hidden, y: np.ndarray, random: np.random.Generator, among: Sequence[Outside]
+) -> tuple[float, Outside]:
+    """p-value of nothing, not told the form: the most surprising form, or sum of cosines, among draws; and of which place."""
     L = np.linalg.cholesky(found.seen.covariance)
     noise = found.seen.rest @ (L @ random.standard_normal((len(L), DRAWS)))
     all_y = np.column_stack([y, noise])
+    each = np.array([_surprise(found, outside, all_y) for outside in among])
+    best = each.max(axis=0)
+    return float((1 + np.sum(best[1:] >= best[0])) / (DRAWS + 1)), among[int(each[:, 0].argmax())]
+
+
+def _surprise(found: Hidden, outside: Outside, all_y: np.ndarray) -> np.ndarray:
+    """(draws,) of the most surprising form of some covariates, or sum of cosines: the logarithm of its p-value, negative."""
+    every = [_basis(columns[:, i]) for _, columns in families(found, outside) for i in range(columns.shape[1])]
+    u = outside.covariates(found.one.placed.true, found.one.context)
+    plain = _acting(found, outside, [wave for wave, _ in _waves(u, PLAIN if len(u) == 1 else 4)])
+    every += [_basis(plain[:, :k]) for k in range(2, plain.shape[1] + 1, 2)]
     ones = [basis for basis in every if basis.shape[1] == 1]
-    best = np.zeros(DRAWS + 1)
+    best = np.zeros(all_y.shape[1])
     if ones:
         best = -stats.chi2.logsf(np.max(np.square(np.hstack(ones).T @ all_y), axis=0), 1)
     for basis in every:
         if basis.shape[1] > 1:
             best = np.maximum(best, -stats.chi2.logsf(np.sum(np.square(basis.T @ all_y), axis=0), basis.shape[1]))
-    return float((1 + np.sum(best[1:] >= best[0])) / (DRAWS + 1))
+    return best
 
 
 def _basis(columns: np.ndarray) -> np.ndarray:
@@ -204,8 +228,7 @@ def _predicted(B: np.ndarray, y: np.ndarray, group: np.ndarray) -> float:
 def alike(found: Hidden, form: str, outside: Outside) -> float:
     """√λ that the best member of a form, of these covariates along this axis, leaves of all that is hidden."""
     signal = found.signal
-    of_it = Hidden(found.one, found.seen, found.errors, found.sizes, outside)
-    columns = next((c for name, c in families(of_it) if name == form), None)
+    columns = next((c for name, c in families(found, outside) if name == form), None)
     if columns is None:
         return float(np.linalg.norm(signal))
     return min(found.seen.left(signal, [columns[:, i]]) for i in range(columns.shape[1]))

@@ -10,7 +10,7 @@ from scipy import special, stats
 
 from benchmarks.second.cases import baseline
 from benchmarks.third.cases import CYCLE, Hidden, case
-from benchmarks.third.oracle import VISIBLE, families, held_out, log_evidence, odds, of_family, told, unformed
+from benchmarks.third.oracle import VISIBLE, families, held_out, log_evidence, odds, of_family, places, told, unformed
 
 
 def outside(seed: int, start: int = 0) -> Hidden:
@@ -40,12 +40,13 @@ def test_the_evidence_of_a_form_is_the_mean_of_its_members() -> None:
 def test_without_noise_and_large_enough_the_true_form_has_the_best_odds_of_the_dictionary() -> None:
     """A member of a form of the grid, at √λ of 60, against all others; of one that is another's, as far as it is."""
     found = outside(11)
-    for form, columns in families(found):
+    assert found.outside is not None
+    for form, columns in families(found, found.outside):
         sizes = np.linalg.norm(columns, axis=(0, 2))
         member = columns[:, int(sizes.argmax()), 0]
         y = 60 * member / np.linalg.norm(member)
         said = odds(found, y)
-        same = {name for name, other in families(found) if _leaves(other, y) < 1e-6 * 60} | {form}
+        same = {name for name, other in families(found, found.outside) if _leaves(other, y) < 1e-6 * 60} | {form}
         assert max(said, key=said.__getitem__) in same
 
 
@@ -68,11 +69,26 @@ def test_a_fit_with_the_true_form_predicts_exactly_what_has_no_noise() -> None:
 def test_noise_alone_is_as_often_surprising_as_is_said() -> None:
     """A rank among draws of its own kind is uniform: the mean of 24 lies within four of its deviations of one half."""
     found = outside(13)
+    assert found.outside is not None
     random = np.random.default_rng(5)
     L = np.linalg.cholesky(found.seen.covariance)
-    each = [unformed(found, found.seen.rest @ (L @ random.standard_normal(len(L))), random) for _ in range(24)]
-    assert abs(np.mean(each) - 0.5) < 4 / np.sqrt(12 * 24)
-    assert unformed(found, 3 * found.signal, random) == pytest.approx(1 / 200)
+    for among in ((found.outside,), tuple(places(found))):
+        each = [
+            unformed(found, found.seen.rest @ (L @ random.standard_normal(len(L))), random, among)[0] for _ in range(24)
+        ]
+        assert abs(np.mean(each) - 0.5) < 4 / np.sqrt(12 * 24)
+        p, best = unformed(found, 3 * found.signal, random, among)
+        assert p == pytest.approx(1 / 200)
+        assert set(best.of) & set(found.outside.of)
+
+
+def test_what_is_hidden_is_among_the_places_that_are_searched() -> None:
+    for number in (11, 12, 13, 14):
+        found = outside(number)
+        where = [(one.of, one.spans, one.along, one.scale) for one in places(found)]
+        true = found.outside
+        assert len(set(where)) == len(where)
+        assert any((set(of), along, scale) == (set(true.of), true.along, true.scale) for of, _, along, scale in where)
 
 
 def test_who_knows_the_form_tests_its_size() -> None:
