@@ -180,9 +180,9 @@ class Combinations:
         return frozenset(by_form) | self.imitated.get(index, frozenset())
 
     def unknown_beside(self, effects: Key) -> float:
-        """Probability that something unknown acts besides, given these known effects."""
+        """Probability that something unknown acts besides, given these known effects; 1 of a set that was not compared."""
         beside = sum(p for key, p in self.probability.items() if self.effects_of(key) == effects and key != effects)
-        return beside / self.of_effects[effects]
+        return beside / self.of_effects[effects] if effects in self.of_effects else 1.0
 
     def of(self, index: int) -> float:
         return self.of_any(frozenset((index,)))

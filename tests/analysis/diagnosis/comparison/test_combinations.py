@@ -144,6 +144,13 @@ def test_one_in_the_place_of_another_is_not_in_that_of_a_third_that_is_merely_le
 
 
 @pytest.mark.long
+def test_beside_a_set_that_was_never_compared_something_unknown_acts() -> None:
+    """As where one of several effects is left out, since least squares of all gives a size that no machine has."""
+    found = of_sets({(): 0.2, (0,): 0.3, (0, 1): 0.5})
+    assert found.unknown_beside(frozenset({0, 1})) == 0.0
+    assert found.unknown_beside(frozenset({1})) == 1.0
+
+
 @pytest.mark.parametrize("count", [2, 5, 7])
 def test_as_many_effects_are_found_as_act(count: int) -> None:
     """More than four are looked for where four are the most probable; where fewer are, nothing is otherwise than before."""
