@@ -125,7 +125,12 @@ def due(
 
 
 def history(
-    machine: str, *, records: str | Path | None = None, on: dt.date | str | None = None, fleet: str | Path | None = None
+    machine: str,
+    *,
+    records: str | Path | None = None,
+    on: dt.date | str | None = None,
+    fleet: str | Path | None = None,
+    parts: Collection[str | Path] = (),
 ) -> History:
     """Every error factor and figure of performance of a machine over its certificates and interim checks.
 
@@ -133,12 +138,14 @@ def history(
     ----------
     machine : its serial, or its name.
     records, on, fleet : as for :func:`cmm_uq.due`.
+    parts : folders with reports of parts, of which those in doubt are named; those beside the records by default.
 
     Raises
     ------
     CmmUqError : there are no records, or the machine is not in them.
     """
-    return History(history_of(machine, records, on=_day(on), fleet=None if fleet is None else Path(fleet)))
+    prior = None if fleet is None else Path(fleet)
+    return History(history_of(machine, records, on=_day(on), fleet=prior, parts=tuple(map(Path, parts))))
 
 
 def _day(on: dt.date | str | None) -> dt.date | None:

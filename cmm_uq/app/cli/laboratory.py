@@ -259,14 +259,21 @@ def history(
     records: str | None = opt.READ_RECORDS,
     on: str | None = opt.ON,
     fleet: Path | None = opt.FLEET,
+    parts: list[Path] | None = option(
+        None, "Folder with reports of parts, anywhere below; may be repeated.", "DIR", "beside the records", "--parts"
+    ),
     out: Path | None = option(None, "Folder for history.html, with pictures, and history.json.", "DIR", "none"),
     end: Ending = opt.FORCED,
 ) -> None:
-    """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
+    """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed.
+
+    After a calibration or a check that it failed: since when it is in doubt, and the parts that were measured on it since.
+    """
     from cmm_uq.app.commands.laboratory.due import history_of, write_history
+    from cmm_uq.certificate.pages.doubt import doubt_words, part_rows
     from cmm_uq.certificate.pages.history import history_data, step_notes, summary_row, terminal_note
 
-    found = history_of(machine, records, on=opt.day_of(on), fleet=fleet)
+    found = history_of(machine, records, on=opt.day_of(on), fleet=fleet, parts=parts or ())
     files = {} if out is None else write_history(found, out, force=end.force)
 
     def lines() -> Iterator[Line]:
@@ -276,6 +283,8 @@ def history(
         yield (f"{found.machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", "")
         yield from screen_layout(verbose=end.verbose).table(summary_row(found, one) for one in found.values)
         yield from [((terminal_note(found), ""),)] if found.values else []
+        yield from (((doubt_words(one), COLOURS["bad"]),) for one in found.doubtful)
+        yield from screen_layout(verbose=True).table(part_rows(found))
         yield from (((text, COLOURS["open"]),) for text in (*step_notes(found), *found.remarks))
         yield from _written(files)
 

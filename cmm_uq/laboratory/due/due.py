@@ -149,6 +149,7 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
         before = _due_date(of, released[-1], [one for one in every if released[-1].day < one], pool)
         if before[0] < due:
             (due, reason, beyond), counts = before, released[-1]
+    remarks += [_IN_DOUBT] if beyond else []
     blocked: Text | None = None
     if (used := artefacts.get(last.artefact)) is not None and used.due is not None and used.due < max(on, due):
         artefact, until = Verbatim(used.serial), day(used.due)
@@ -161,6 +162,9 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
             text = say("Its artefact {artefact} is itself due on {due}, before that.", artefact=artefact, due=until)
             remarks.append(text)
     return item(counts.day, due, reason, tuple(remarks), last.artefact, blocked, beyond)
+
+
+_IN_DOUBT = say("What was measured on it since it was last in order is in doubt: its history lists it.")
 
 
 def _due_date(

@@ -21,6 +21,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, day, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.verdicts import BEYOND, NONE
+from cmm_uq.laboratory.due.doubt import DoubtfulPeriod, doubtful_periods
 from cmm_uq.laboratory.due.rule import ComparedValue, ValueChange, change, common_part, is_of_machine
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine, Series
 
@@ -136,6 +137,7 @@ class MachineHistory:
     certificates: tuple[RecordedCertificate, ...]
     values: tuple[ValueHistory, ...]  # in the order of the newest certificate
     remarks: tuple[Text, ...]  # what is to be known, a sentence each
+    doubtful: tuple[DoubtfulPeriod, ...] = ()  # when what was measured on it is in doubt
 
     @property
     def decision(self) -> str:
@@ -185,7 +187,8 @@ def machine_history(
         remarks.append(say("No certificate has limits, so that none can be met."))
     if known and len({one.day for one in known}) == 1:
         remarks.append(say("There is one day of recordings only: a trend needs two."))
-    return MachineHistory(machine, on, known, values, tuple(remarks))
+    doubtful = doubtful_periods([one for one in known if one.state in STANDING])
+    return MachineHistory(machine, on, known, values, tuple(remarks), doubtful)
 
 
 def _until(series: Series, on: dt.date) -> Series:

@@ -328,8 +328,15 @@ def _adjusted(connection: Connection, of: Collection[int]) -> dict[int, list[str
 
 
 def _stated(names: Collection[str] | None, origin: str) -> Select[Any]:
-    """Values of standing certificates and interim checks, by day, entry."""
-    f, q = figures.c, quantities.c
+    """Values of standing certificates and interim checks, by day, entry; of drafts of one recording the newest alone.
+
+    A draft beside a released certificate of the same recording counts for nothing: a value would change by nothing since.
+    """
+    f, q, later = figures.c, quantities.c, certificates.alias().c
+    same = [later[name] == _C[name] for name in ("machine", "job", "day", "interim")]
+    same.append(later.adjusted_since.is_not_distinct_from(_C.adjusted_since))
+    instead = select(later.entry).where(*same, *_measured(later, origin))
+    instead = instead.where((later.state == "released") | (later.entry > _C.entry)).correlate(certificates)
     joined = certificates.join(figures, f.certificate == _C.entry).join(quantities, q.id == f.quantity)
     query = (
         select(
@@ -337,7 +344,7 @@ def _stated(names: Collection[str] | None, origin: str) -> Select[Any]:
             f.at_most.label("limit"), _C.entry, _C.adjusted_since, _C.interim,
         )
         .select_from(joined.outerjoin(artefacts, artefacts.c.id == _C.artefact))
-        .where(*_measured(_C, origin))
+        .where(*_measured(_C, origin), (_C.state == "released") | ~instead.exists())
         .order_by(_C.day, _C.entry, f.place)
     )  # fmt: skip
     return query if names is None else query.where(q.name.in_(tuple(names)))

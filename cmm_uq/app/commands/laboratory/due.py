@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +16,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
+from cmm_uq.laboratory.due.doubt import with_parts
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used
@@ -212,16 +213,26 @@ def _iso(day: dt.date | None) -> str | None:
 
 
 def history_of(
-    machine: str, where: Where = None, *, on: dt.date | None = None, fleet: Path | None = None
+    machine: str,
+    where: Where = None,
+    *,
+    on: dt.date | None = None,
+    fleet: Path | None = None,
+    parts: Collection[Path] = (),
 ) -> MachineHistory:
+    """``parts``: folders with reports of parts anywhere below; those beside the records, to two folders deep, by default."""
     day, learnt = on or _today(), read_fleet(fleet)
     with open_records(where, read_only=True) as records:
         found = records.machine(machine)
-        certificates = records.certificates(found.serial, values=False)
+        certificates, home = records.certificates(found.serial), records.home
         series = records.series(found.serial)
         entries = (one.entry[one.day <= day.toordinal()] for one in series.values())
         stated = outcomes_of(records, {int(until[-1]) for until in entries if len(until)})
-        return machine_history(found, certificates, series, day, _priors(learnt, found), stated)
+        history = machine_history(found, certificates, series, day, _priors(learnt, found), stated)
+    below = [(home, f"{deep}results.json") for deep in ("*/", "*/*/") if home is not None]
+    places = [(folder, "**/results.json") for folder in parts] or below
+    reports = sorted({file for folder, names in places for file in folder.glob(names)})
+    return replace(history, doubtful=with_parts(history.doubtful, found, reports, day))
 
 
 def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:

@@ -1,0 +1,107 @@
+"""When a machine was in doubt, and which parts were measured on it then.
+
+A calibration that finds a machine beyond its limits, or an interim check out of control, puts in doubt what was measured since
+it was last found in order (ISO/IEC 17025:2017, 7.10): by the last calibration that does not find it so, or a check in
+control. Only a later calibration in order ends that. What nobody has released finds a machine out of order, and in order only
+where nothing of it is ever released. Parts are found by their reports, which name their machine and its certificate.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import TABLE_BYTES, content_of
+from cmm_uq.jobs.verdicts import BEYOND
+from cmm_uq.laboratory.due.rule import check_standings
+from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedMachine, spelled
+
+_OPEN = ("undecided", "remeasure")  # decisions by which a machine is neither in order nor out of it
+SCHEMA = "cmm-uq/part/"
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredPart:
+    """A part's report: which part, when it was measured, by which certificate of the machine, and what came of it."""
+
+    day: dt.date
+    calibrated: dt.date
+    folder: str
+    number: str
+    part: str
+    serial: str
+    certificate: str
+    outcome: str
+
+
+@dataclass(frozen=True)
+class DoubtfulPeriod:
+    """From the last day that found a machine in order to the calibration that did so again."""
+
+    after: dt.date | None  # ``None`` where nothing before found it in order
+    found: RecordedCertificate  # the first that found it out of order
+    until: dt.date | None = None  # ``None`` where nothing since found it in order
+    parts: tuple[MeasuredPart, ...] = ()
+
+    def holds(self, part: MeasuredPart) -> bool:
+        """Whether a part was measured in it, by no certificate of after it; on the first day too, at whatever hour."""
+        renewed = self.until is not None and part.calibrated >= self.until
+        return not renewed and (self.after is None or part.day >= self.after)
+
+
+def doubtful_periods(certificates: Sequence[RecordedCertificate]) -> tuple[DoubtfulPeriod, ...]:
+    """Of certificates and interim checks of one machine that stand, with their values, by day."""
+    released = any(one.state == "released" for one in certificates)
+    found, good, checks = list[DoubtfulPeriod](), None, list[RecordedCertificate]()
+    base: RecordedCertificate | None = None
+    for one in certificates:
+        beyond, in_order = one.decision in BEYOND, not one.interim and one.decision not in (*BEYOND, *_OPEN)
+        if one.interim and base is not None:
+            checks.append(one)
+            standing = check_standings(base, checks)[-1].standing
+            beyond, in_order = standing == "action", standing == "in control"
+        elif not one.interim:
+            base, checks = one, []
+        lasts = bool(found) and found[-1].until is None
+        if beyond and not lasts:
+            found.append(DoubtfulPeriod(good, one))
+        elif in_order and (one.state == "released" or not released) and not (lasts and one.interim):
+            good = one.day
+            if lasts:
+                found[-1] = replace(found[-1], until=good)
+    return tuple(found)
+
+
+def parts_measured(machine: RecordedMachine, reports: Iterable[Path]) -> Iterator[MeasuredPart]:
+    """Of files ``results.json`` those of parts that were measured on a machine; what cannot be read is refused."""
+    called = spelled(machine.name if machine.by_name else machine.serial)
+    for file in reports:
+        content = content_of(file, TABLE_BYTES, "Mend it, or name other folders with --parts")
+        try:
+            data = json.loads(content)
+            if not str(data["schema"]).startswith(SCHEMA) or data["job"]["origin"] != "measured":
+                continue
+            job, part, by = data["job"], data["part"], data["machine"]
+            if spelled(str((not machine.by_name and by["serial"]) or by["machine"])) == called:
+                when, calibrated = (dt.date.fromisoformat(one["date"]) for one in (job, by))
+                number, outcome = job.get("number") or job["id"], data["decision"]["outcome"]
+                texts = [str(one or "") for one in (number, part["name"], part["serial"], by["number"], outcome)]
+                yield MeasuredPart(when, calibrated, str(file.parent), *texts)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            if b'"cmm-uq/part/' in content:
+                raise CmmUqError(
+                    "is no results.json of a part", where=str(file), fix="Ask for the report anew"
+                ) from None
+
+
+def with_parts(
+    periods: Sequence[DoubtfulPeriod], machine: RecordedMachine, reports: Iterable[Path], on: dt.date
+) -> tuple[DoubtfulPeriod, ...]:
+    """Periods with the parts that were measured in them up to a day, by day."""
+    every = sorted(parts_measured(machine, reports), key=lambda one: (one.day, one.number)) if periods else []
+    known = [one for one in every if one.day <= on]
+    return tuple(replace(one, parts=tuple(part for part in known if one.holds(part))) for one in periods)
