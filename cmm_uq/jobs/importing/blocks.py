@@ -15,24 +15,15 @@ from itertools import pairwise
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.figures import figure, sign_of, unit_of
 from cmm_uq.jobs.importing.factors import LINE, RUN, hint
-from cmm_uq.jobs.importing.format import (
-    LENGTH,
-    UNITS,
-    NotReadError,
-    Sheet,
-    Sources,
-    WrittenUnit,
-    apart,
-    sources_of,
-    unit_named,
-)
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, NotReadError, Sheet, WrittenUnit, apart, unit_named
 from cmm_uq.jobs.importing.header import COVERAGE, WORD, named_alike, plain_words, without_unit, words_of
 from cmm_uq.jobs.importing.lengths import places
 
 _RULE = re.compile(r"[-=_*+|.\s]*")
-DATED = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}|\d:\d\d|年")
+DATED = re.compile(r"\d{4}[./-]\d{1,2}[./-]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,4}|\d:\d\d|年")
 _PRINTED, _BRACKETS = re.compile(r"\d[.,]\d"), re.compile(r"\([^)]*\)")
 _FORMULA = re.compile(r"(?<=\S)(?<![XYZxyz])\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
@@ -64,7 +55,7 @@ class Block:
 class CutSheet:
     """Cells of a sheet as figures, cut into blocks."""
 
-    def __init__(self, sheet: Sheet, keys: Mapping[str, Sources] | None = None, where: str = "") -> None:
+    def __init__(self, sheet: Sheet, keys: Mapping[str, formats.Sources] | None = None, where: str = "") -> None:
         self.sheet, self.keys, self.where = sheet, dict(keys or {}), where
         self.sign = sheet.decimal or sign_of(sheet.rows)
         self.width = max(map(len, sheet.rows), default=0)
@@ -133,7 +124,7 @@ class CutSheet:
         """What the job says that a column is."""
         whole = " ".join(" ".join(text.split()) for text in path if text)
         own = {f"{i + 1}", *(text.strip().casefold() for text in (whole, *path) if text)}
-        every = ((name, str(one)) for name, sources in self.keys.items() for one in sources_of(sources))
+        every = ((name, str(one)) for name, sources in self.keys.items() for one in formats.sources_of(sources))
         found = [(name, one) for name, one in every if one.replace("\n", " ").strip().casefold() in own]
         self.matched |= {one for _, one in found}
         return found[0][0] if found else ""
@@ -156,7 +147,9 @@ class CutSheet:
         if len(counted) < len(own) or len(own) < 2:
             return False
         steps = [(b - a, b) for a, b in pairwise(counted)]
-        return counted[0] in (0, 1) and any(s == 1 for s, _ in steps) and all(s == 1 or b in (0, 1) for s, b in steps)
+        runs = hint(self.text(i, 0), lengths=True) == RUN  # as ``Run 1 1 2 2``
+        each = all(s == 1 or b in (0, 1) or (runs and s == 0) for s, b in steps)
+        return counted[0] in (0, 1) and any(s == 1 for s, _ in steps) and each
 
     def _kind(self, i: int) -> str:
         """``figures``, ``text``, or ``rule`` of a row."""
@@ -174,11 +167,9 @@ class CutSheet:
         if (counted or turned) and hint(self.text(i, filled[0]), lengths=True) in (LINE, RUN):
             return "text"  # as Position;1 above a block, or Position 1 | 90 deg
         if self._is_head(i) and i + 1 < len(self.sheet.rows):
-            units = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i + 1] if cell != ""]
+            own = [str(cell).strip("[]()<>{} ") for cell in self.sheet.rows[i + 1] if cell != ""]
             below = next((j for j in range(i + 1, min(len(self.figures), i + DEEPEST)) if any(self.figures[j])), i + 1)
-            if any((self.figure(below, k) or (0, 1))[1] < 1 for k in numbers) or (
-                units and all(map(unit_named, units))
-            ):
+            if any((self.figure(below, k) or (0, 1))[1] < 1 for k in numbers) or (own and all(map(unit_named, own))):
                 return "text"
         texts = {k for k in filled if k not in numbers and unit_named(self.text(i, k)) is None}
         alike = [j for j, own in zip(near, beside, strict=True) if numbers == own]
@@ -198,9 +189,7 @@ class CutSheet:
         kinds = [kind for kind in self.kinds if kind != "rule"]
         most = max(2, sum(two == ("text", "figures") for two in pairwise(kinds)) // 2)
         texts = Counter(self.line(i) for i, kind in enumerate(self.kinds) if kind == "text")
-        self._always = {
-            text for text, count in texts.items() if count > most
-        }  # above nearly all figures, as labels are
+        self._always = {text for text, count in texts.items() if count > most}  # above nearly all figures
         for i, kind in enumerate(self.kinds):
             if kind == "text":
                 pending.append(i)
@@ -253,15 +242,11 @@ class CutSheet:
 
     def _place_columns(self, block: Block) -> dict[str, list[int]]:
         """Columns of the coordinates of starts, ends or directions beside lengths: by words, else X, Y and Z twice."""
-        heads = [
-            (i, " ".join(path)) for i, path in enumerate(block.paths) if any(self.figure(r, i) for r in block.rows)
-        ]
+        heads = [(i, " ".join(own)) for i, own in enumerate(block.paths) if any(self.figure(r, i) for r in block.rows)]
         columns: dict[str, list[int]] = {}
         for i, text in heads:
             columns.setdefault(places.START if _ORIGIN.search(text) else places.role_among(text), []).append(i)
-        by_words = {
-            role: own for role, own in columns.items() if role and len(own) == (1 if role in places.ANGLES else 3)
-        }
+        by_words = {of: own for of, own in columns.items() if of and len(own) == (1 if of in places.ANGLES else 3)}
         if {places.START, places.CENTRE} & {*by_words} and len(by_words) > 1:
             return by_words
         named = (next((one for one in path[::-1] if _AXIS_LETTER.search(one)), "") for path in block.paths)
@@ -308,9 +293,7 @@ class CutSheet:
             azimuth, elevation = (np.radians(values.pop(angle)[0]) for angle in places.ANGLES)
             across = np.cos(elevation)
             values[places.DIRECTION] = [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)]
-        texts += [
-            f"{role} ({'; '.join(f'{one:.10f}' for one in own)})" for role, own in values.items() if len(own) == 3
-        ]
+        texts += [f"{of} ({'; '.join(f'{one:.10f}' for one in own)})" for of, own in values.items() if len(own) == 3]
         return tuple(texts)
 
     def _held(self, row: int, columns: Sequence[int], first: int) -> list[float]:

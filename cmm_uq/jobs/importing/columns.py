@@ -18,23 +18,13 @@ from cmm_uq.base.files.limits import CELLS, COLUMNS, ROWS
 from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, semicolons
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
-from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing import format as units, header as heads
 from cmm_uq.jobs.importing.blocks import FINER
 from cmm_uq.jobs.importing.cells.encodings import decimal_sign, is_number, split_units, values_of
 from cmm_uq.jobs.importing.cells.figures import figure
 from cmm_uq.jobs.importing.factors import Label
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, NotReadError, Sheet, WrittenUnit
-from cmm_uq.jobs.importing.header import (
-    NAME,
-    REMARK,
-    SUMMARY,
-    Header,
-    filled_down,
-    is_summary,
-    named_alike,
-    shown,
-    text_of,
-)
+from cmm_uq.jobs.importing.header import NAME, REMARK, SUMMARY, Header, filled_down, is_summary, named_alike, shown
 from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
 from cmm_uq.jobs.importing.roles import names_length, said
 
@@ -126,9 +116,8 @@ def _refuse_places_of_lengths(written: Written, table: ExportTable, sign: str) -
     ]
     whole = all(np.all(values % 1 == 0) for axis in COORDINATES for values, _, _ in written.get(axis, ()))
     places = [table.cells[k] for axis in COORDINATES for k in table.header.columns.get(axis, ())]
-    coarse = (
-        1.0 if whole else min((f[1] for cells in places for cell in cells if (f := figure(cell, sign))), default=0.0)
-    )
+    finest = min((f[1] for own in places for cell in own if (f := figure(cell, sign))), default=0.0)
+    coarse = 1.0 if whole else finest
     for i in beside:
         if (first := figure(table.cells[i][0], sign)) and first[0] > 1 and first[1] * (1 if whole else FINER) < coarse:
             what = f"X, Y and Z are {'whole' if whole else 'coarse'}, and {headings[i]!r} was measured there"
@@ -296,7 +285,7 @@ class ExportTable:
         """Names and whole numbers that stand beside points, in the columns of names and in those that are not known."""
         names = self.header.columns.get(NAME, ())
         beside = () if self.header.points > 1 else sorted({*names, *self.header.unused})
-        cells = [(i, self.header.headings[i], [*map(text_of, filled_down(self.cells[i]))]) for i in beside]
+        cells = [(i, self.header.headings[i], [*map(heads.text_of, filled_down(self.cells[i]))]) for i in beside]
         whole = [one for one in cells if one[0] in names or not any(map(_DECIMAL.search, one[2]))]
         return [Label(name, tuple(own)) for _, name, own in whole if "" not in own]
 

@@ -36,6 +36,12 @@ _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
 _SHORTENED = re.compile(r"[^\W\d_]{3,}(?=\.)")
 _DATED = 8  # digits of a date
 _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
+_COUNTED = re.compile(r"[^\W\d_\u3040-\u9fff\uac00-\ud7a3]+|[\u3040-\u9fff\uac00-\ud7a3]+|\d+")
+_NEXT = re.compile(r"\W{0,3}|_|\W{0,2}n(?:o|r)?\W{1,2}|\W?no\W?", re.IGNORECASE)  # between a word and its number
+_BEFORE = re.compile(r"(?<![\d.,])第?(\d+)\s?(?:[.ªº°]|st|nd|rd|th|er|e|ère)?\s?$", re.IGNORECASE)
+_OF_ALL = re.compile(r"\s?(?:/|\b(?:of|von|de|di|sur|van|av|z|из)\b)\s?\d+")
+_OF_SEVERAL = re.compile(r"(?<![\d.,/])(\d{1,2})\s?(?:/|\b(?:of|von|de|di|sur|van|av|z|из)\b)\s?(\d{1,2})(?![\d.,/])")
+_PRINTED = re.compile(r"[.,:]\d")
 LETTERS = {*"ABCDEFGHabcdefgh"}  # of balls
 # in names, ahead of their numbers
 _SHORT = {"m": LINE, "p": POINT, "b": POINT, "k": POINT, "r": RUN, "w": RUN, "l": LINE, "bar": LINE, "stab": LINE,
@@ -139,6 +145,7 @@ def numberless(text: str) -> str:
     return re.sub(r"\d+|\b(?:I{1,3}|IV|VI{1,3}|IX)\b", "0", unicodedata.normalize("NFKC", text))
 
 
+@lru_cache(maxsize=16_384)
 def hint(text: str, *, lengths: bool) -> str | None:
     """What words say that a label counts."""
     of, columns = words_of("lengths"), words_of("columns")
@@ -181,13 +188,61 @@ def parts_of(label: Label) -> list[Label]:
             before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
         if len(found) > 1 or (found and cut is not str and found[0].values != label.values):
             return found
-    last = [m for value in label.values if (m := re.fullmatch(r"(.*?([^\W\d_]*))[\W_]*(\d+)\D*", value))]
+    last = [m for value in label.values if (m := re.fullmatch(r"(.*?[^\W\d_]*)[\W_]*(\d+)\D*", value))]
     if len(last) < len(label.values):
         return []
-    words = {m[2] for m in last}
-    of = word if len(words) == 1 and hint(word := words.pop(), lengths=True) == RUN else label.words
-    names = tuple(m[1] for m in last)
-    return [Label(label.words, names, "part"), Label(of, tuple(m[3] for m in last), "part")]
+    return [Label(label.words, tuple(m[k] for m in last), "part") for k in (1, 2)]
+
+
+def run_apart(label: Label, *, lengths: bool) -> list[Label]:
+    """What texts name, and the number of the run that all of them say beside it, as ``Position 2, run 1 of 3``."""
+    if label.sort == "column" and any(map(_counts_run, heads := _TOKEN.findall(label.words))) and len(heads) > 1:
+        cells = [_TOKEN.findall(value) for value in label.values]  # each word of the head over a part, as ``Pos/Rep``
+        if {*map(len, cells)} == {len(heads)}:
+            each = zip(heads, zip(*cells, strict=True), strict=True)
+            return [Label(word, tuple(own), "column") for word, own in each]
+    found = [one for value in label.values if (one := _run_in(value))]
+    if not found:
+        several = [(value, m) for value in label.values if (m := _OF_SEVERAL.search(value))]
+        found = [("run", _without(value, *m.span()), m[1]) for value, m in several]
+        names, counts = ({own[k] for own in found} for k in (1, 2))
+        if len({*found}) < len(names) * len(counts) or any(len(counts) != int(m[2]) for _, m in several):
+            return []  # not each of 1/3, 2/3 and 3/3 of each name
+    word, rest, numbers = zip(*found, strict=True) if len(found) == len(label.values) else ((), (), ())
+    if not all(rest) or len({*rest}) < 2:
+        return []
+    if not lengths and hint(word[0], lengths=False) == LINE and hint(rest[0], lengths=True) != LINE:
+        return []  # as measurements of balls are no runs
+    named = Label("" if _counts_run(label.words) else label.words, rest, label.sort)
+    return [named] if fixes(codes(rest), codes(numbers)) else [named, Label("run", numbers, "part")]
+
+
+@lru_cache(maxsize=4096)
+def _run_in(text: str) -> tuple[str, str, str] | None:
+    """The word for a run in a text, what else it says, and the number of the run; ``None`` where it has none."""
+    text = unicodedata.normalize("NFKC", text)
+    own = [*_COUNTED.finditer(text)]
+    for k, word in enumerate(own):
+        if word[0].isdigit() or word[0] == "第" or (len(word[0]) < len("run") and not unspaced(word[0])):
+            continue
+        measured = not {*plain_words(word[0])}.isdisjoint(words_of("columns")["measurement"])
+        if _counts_run(word[0]) or (measured and hint(word[0], lengths=True) != LINE):
+            after = next((m for m in own[k + 1 : k + 3] if m[0].isdigit()), None)
+            if after and _NEXT.fullmatch(text[word.end() : after.start()]) and not _PRINTED.match(text, after.end()):
+                end = after.end() + (m.end() if (m := _OF_ALL.match(text[after.end() :])) else 0)
+                return word[0], _without(text, word.start(), end), after[0]
+            if (before := _BEFORE.search(text[: word.start()])) is not None:
+                return word[0], _without(text, before.start(), word.end()), before[1]
+    return None
+
+
+def _counts_run(word: str) -> bool:
+    return hint(word, lengths=True) == RUN
+
+
+def _without(text: str, start: int, end: int) -> str:
+    rest = re.sub(r"[(\[【]\W*[)\]】]", " ", f"{text[:start]} {text[end:]}")
+    return re.sub(r"^[^\w+(\[]+|[^\w+)\]-]+$|\s-+$", "", " ".join(rest.split()))
 
 
 def _halves(label: Label) -> list[Label]:
@@ -223,25 +278,26 @@ def together(first: Ints, *others: Ints) -> Ints:
 def varying(labels: Sequence[Label], *, lengths: bool) -> list[Counted]:
     """Labels, and parts of names, that differ and are there for all, without those that say the same again."""
     seen: dict[bytes, Counted] = {}
-    names = (label for label in labels if label.sort in ("column", "head", "title") and len({*label.values}) > 1)
+    every = list[Label]()
+    for label in labels:
+        split = run_apart(label, lengths=lengths) if label.sort in ("column", "head", "title", "sheet") else []
+        every += split or [label]
+    names = (label for label in every if label.sort in ("column", "head", "title") and len({*label.values}) > 1)
     names = (label for label in names if not all(map(str.isdecimal, label.values)))
-    for label in (*labels, *(part for name in names for part in parts_of(name))):
+    for label in (*every, *(part for name in names for part in parts_of(name))):
         own = codes(label.values)
         if own.max(initial=0) and "" not in label.values:
-            before, of = seen.get(own.tobytes()), counted(label, lengths=lengths)
-            if (
-                before is None
-                or (before[2] is None and of is not None)
-                or (
-                    lengths
-                    and before[2] is of is None
-                    and before[0].values[0].isdecimal() > label.values[0].isdecimal()
-                )
-                or (label.sort == "head" and of == LINE and counting(before[0].values))
-                or (before[2] == POINT and label.sort == "column" and hint(label.words, lengths=lengths) == LINE)
-            ):
+            of, (first, _, known) = counted(label, lengths=lengths), seen.get(own.tobytes(), (label, own, ""))
+            plain = lengths and first.values[0].isdecimal() > label.values[0].isdecimal()
+            better = known == "" or (known is None and (of is not None or plain))
+            better |= label.sort == "head" and of == LINE and counting(first.values)
+            if better or (known == POINT and label.sort == "column" and hint(label.words, lengths=lengths) == LINE):
                 seen[own.tobytes()] = label, own, of
-    return [*seen.values()]
+    found = [*seen.values()]
+    if not lengths and any(f[2] == LINE and counted(f[0], lengths=True) == LINE for f in found):
+        # beside placements measurements are runs
+        found = [(f[0], f[1], RUN if f[2] == LINE and counted(f[0], lengths=True) != LINE else f[2]) for f in found]
+    return found
 
 
 def in_turn(key: Ints) -> Ints:
@@ -257,8 +313,7 @@ def in_turn(key: Ints) -> Ints:
 def numbered_runs(values: Sequence[str]) -> Ints:
     """Numbers of runs: those that their labels have, else as they come, as of dates."""
     numbers = [re.findall(r"\d+", value) for value in values]
-    if all(len(one) == 1 and len(one[0]) < _DATED for one in numbers) and len({*values}) == len(
-        {one[0] for one in numbers}
-    ):
+    plain = all(len(one) == 1 and len(one[0]) < _DATED for one in numbers)
+    if plain and len({*values}) == len({one[0] for one in numbers}):
         return np.array([int(one[0]) for one in numbers])
     return codes(values) + 1

@@ -15,20 +15,8 @@ import numpy as np
 import scipy
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.jobs.importing.factors import (
-    LETTERS,
-    LINE,
-    POINT,
-    RUN,
-    Counted,
-    Label,
-    counted,
-    fixes,
-    in_turn,
-    numbered_runs,
-    together,
-    varying,
-)
+from cmm_uq.jobs.importing import factors
+from cmm_uq.jobs.importing.factors import LINE, POINT, RUN, Counted, Label, codes, counted, fixes, in_turn, together
 
 _SAME_PLACE_MM = 0.5
 _RIGID_MM = 0.1
@@ -85,17 +73,17 @@ def _places_of_many(xyz: Floats) -> Ints:
 def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]] | None:
     """Measurement, point and repeat of each of the places (n, 3), mm; ``None`` where nothing says which belong together."""
     place = places(xyz)
-    found = varying(labels, lengths=False)
+    found = factors.varying(labels, lengths=False)
     ways = [*filter(None, (_grouped(of, found, place, xyz) for of in _labels(found)))]
     each = int(place.max()) + 1  # of which a few have two names
     whole = (f for f in found if each <= f[1].max() < _SINGLE * each and fixes(f[1], place))
     ways += (Grouping(_NAMED, None, 0 * place, f[1], f) for f in whole)
-    plate = len(xyz) <= _COMPARED and _on_a_plate(xyz[np.unique(place, return_index=True)[1]])
+    plate = len(xyz) <= _COMPARED and on_a_plate(xyz[np.unique(place, return_index=True)[1]])
     named = any(way.of is None and way.rank and way.at.max() + 1 < len(xyz) for way in ways)  # names that come again
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
     if not found and place.max() + 1 == len(xyz) > _FEW and not any(way.rank for way in ways):
-        return _told(Grouping(0.0, None, 0 * place, place, None), found, xyz)  # a list, and nothing else
+        return _told(Grouping(0.0, None, 0 * place, place, None), found, xyz, labels)  # a list, and nothing else
     if not plate and _copied(ways, xyz) and all(way.of is None or way.rank < _NAMED for way in ways):
         return None  # names of points, which may be one artefact in several places
     ways = [
@@ -110,7 +98,7 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     alike = (way.measurement for way in ways if way.rank == best.rank)
     if best.rank <= _NAMED and not all(fixes(own, one) and fixes(one, own) for one in alike):
         return None
-    return _told(best, found, xyz)
+    return _told(best, found, xyz, labels)
 
 
 def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
@@ -199,7 +187,7 @@ def _rank(of: Counted, shape: str, *, named: bool, again: Counted | None) -> flo
         return 0.0
     if shape == "moved":
         return (_NAMED if of[0].sort == "part" else _RESTARTED if of[0].sort == "column" else _MOVED) + word
-    called = again is not None and again[2] == POINT and not {*again[0].values} <= LETTERS
+    called = again is not None and again[2] == POINT and not {*again[0].values} <= factors.LETTERS
     return _RESTARTED if again and of[2] is None and (of[0].sort != "part" or called) else 0.0
 
 
@@ -239,7 +227,7 @@ def _shape(xyz: Floats, measurement: Ints, point: Ints) -> str:
     return "turned" if np.ptp(away, axis=1).max() > 1 else "moved"
 
 
-def _on_a_plate(xyz: Floats) -> bool:
+def on_a_plate(xyz: Floats) -> bool:
     """Whether places (n, 3) lie in one plane, on one square grid."""
     about = xyz - xyz.mean(axis=0)
     if len(xyz) < 6 or np.linalg.svd(about)[1][2] > _EVEN_MM * np.sqrt(len(xyz)):
@@ -276,8 +264,8 @@ def _means(xyz: Floats, of: Ints) -> Floats:
     return (sums / np.bincount(of)[:, None])[of]
 
 
-def _told(way: Grouping, found: Sequence[Counted], xyz: Floats) -> dict[str, list[str]]:
-    """Names of measurement and point, and number of the repeat, of each place."""
+def _told(way: Grouping, found: Sequence[Counted], xyz: Floats, labels: Sequence[Label]) -> dict[str, list[str]] | None:
+    """Names of measurement and point, and number of the repeat, of each place; ``None`` where repeats may be placements."""
     count, at, measurement = len(way.at), way.at, way.measurement
     named = [way.of[0].values] if way.of else []
     visits, run = in_turn(at), None
@@ -285,16 +273,31 @@ def _told(way: Grouping, found: Sequence[Counted], xyz: Floats) -> dict[str, lis
         runs = [f for f in found if f[2] == RUN or f[1].max() + 1 <= most]
         apart = [f for f in runs if together(at, f[1]).max() + 1 == count and (f[2] == RUN or f[1].max() + 1 == most)]
         run = min(apart, key=lambda f: (f[1].max() + 1 != most, f[2] != RUN), default=None)
+        same = (
+            one.values for one in labels if run and one.sort == "column" and np.array_equal(codes(one.values), run[1])
+        )
+        forms = {factors.numberless(value) for values in same for value in values}
+        if run is not None and run[2] != RUN and forms and (len(forms) > 1 or forms.pop().count("0") != 1):
+            return None  # which may be placements of what was measured in its own coordinates
+        beside = [f for f in found if f[0].sort == "column" and f[2] is None and not fixes(at, f[1])]
         above = [f for f in found if f[0].sort in ("title", "sheet", "head") and f is not way.of]
         # as two stations from each of which all was measured twice, or two artefacts
         whole = ((one, f) for one in above for f in runs if f is not one and run is None)
         pairs: list[tuple[Counted, Counted | None]]
-        pairs = [(one, f) for one, f in whole if together(at, one[1], f[1]).max() + 1 == count]
+        pairs = [*whole]
+        pairs += [(one, f) for one in beside for f in runs if run is None and f[2] == RUN != one[2]]
+        pairs = [(one, f) for one, f in pairs if f and together(at, one[1], f[1]).max() + 1 == count]
         own = run if run and run[2] == RUN else None
         pairs += [(one, own) for one in above if one[2] != RUN and _elsewhere(xyz, at, one[1])]
+        if run is None and not pairs and beside:
+            return None
         if pairs:
             (one, run), *_ = pairs
-            named, measurement, at = [*named, one[0].values], together(measurement, one[1]), together(one[1], at)
+            named, measurement, at = (
+                [*named, one[0].values],
+                together(measurement, one[1]),
+                together(one[1], at),
+            )
     first = np.unique(measurement, return_index=True)[1]
     texts = [" ".join(one[k] for one in named) or "1" for k in first]
     columns = {"measurement": [texts[m] for m in measurement.tolist()]}
@@ -305,5 +308,5 @@ def _told(way: Grouping, found: Sequence[Counted], xyz: Floats) -> dict[str, lis
         turns = dict(zip(at[rows].tolist(), in_turn(measurement[rows]).tolist(), strict=True))
         columns["point"] = [f"{turns[one]}" for one in at.tolist()]
     if int((visits := in_turn(at)).max()) > 1:
-        columns["repeat"] = [f"{n}" for n in (visits if run is None else numbered_runs(run[0].values))]
+        columns["repeat"] = [f"{n}" for n in (visits if run is None else factors.numbered_runs(run[0].values))]
     return columns

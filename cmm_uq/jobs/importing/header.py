@@ -261,9 +261,8 @@ def unambiguous(found: Assigned, headings: Sequence[str], place: str, points: in
     odd += [name for name in COORDINATES if len(columns.get(name, ())) not in (0, count)]
     if odd:
         fix = f"Say which: columns = {{ {odd[0]} = [ … ] }}, one heading for each point"
-        raise NotReadError(
-            f"{count} points in a row, and {len(columns[odd[0]])} columns {odd[0]}", where=place, fix=fix
-        )
+        what = f"{count} points in a row, and {len(columns[odd[0]])} columns {odd[0]}"
+        raise NotReadError(what, where=place, fix=fix)
     return columns
 
 
@@ -338,10 +337,14 @@ def _words_of_sums() -> tuple[frozenset[str], frozenset[str]]:
 def is_summary(row: Sequence[Cell]) -> bool:
     """Whether one of the first two cells is a word for a figure of other rows, or the first has a unit: ``Form (µm)``."""
     labels = [cell for cell in row if cell != ""][:2]
-    words = [plain_words(cell) for cell in labels if isinstance(cell, str) and not cell[-1:].isdigit()]
+    named = [c for c in labels if isinstance(c, str)]
+    texts = [re.sub(r"(?<=\w\w\w)\s*(?:[(\[].*|[:=].*$)", "", cell) for cell in named]
+    words = [plain_words(text) for text in texts if not text[-1:].isdigit()]
     sums, others = _words_of_sums()
     known = words_of("rows")["summary"]
-    if any(" ".join(own) in known or (not sums.isdisjoint(own) and others.issuperset(own)) for own in words):
+    begun = {own[0] for own in words if own and len(own[0]) > len("ok") and not any(map(str.isdigit, own))}
+    whole = any(" ".join(own) in known or (not sums.isdisjoint(own) and others.issuperset(own)) for own in words)
+    if whole or not begun.isdisjoint(known - words_of("lengths")["run"]):
         return True
     label = text_of(labels[0]) if labels else ""
     return label.endswith((")", "]")) and not re.search(r"\d", label) and without_unit(label)[1] is not None

@@ -31,21 +31,11 @@ from cmm_uq.jobs.importing.factors import (
     in_turn,
     numbered_runs,
     parts_of,
+    run_apart,
     senses,
     together,
 )
-from cmm_uq.jobs.importing.format import (
-    LINE_PLACE,
-    UNITS,
-    Fact,
-    ImportKeys,
-    NotReadError,
-    Row,
-    Sheet,
-    length_named,
-    sheets_of,
-    unit_named,
-)
+from cmm_uq.jobs.importing.format import LINE_PLACE, UNITS, Fact, ImportKeys, NotReadError, Row, Sheet, length_named
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 from cmm_uq.jobs.importing.lengths.placing import place_of_axis
 from cmm_uq.jobs.importing.reports import TextReport
@@ -210,7 +200,7 @@ def placed_runs(
         for k, (target, deviation, line) in enumerate(run.targets, 1):
             reading = (*(start + target * direction), deviation, *direction, *approach)
             rows.append(("", [f"{cell:.10g}" for cell in (measurement, first + k, run.number, *reading)], line))
-    return sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, _told(axes, places, stated)))
+    return units.sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, _told(axes, places, stated)))
 
 
 class _Runs:
@@ -241,7 +231,7 @@ class _Runs:
 
     def _check(self, where: str) -> None:
         kind = self.facts.get("owner", "")
-        if (unit := self.facts.get("error-units")) and unit_named(unit) != UNITS["um"]:
+        if (unit := self.facts.get("error-units")) and units.unit_named(unit) != UNITS["um"]:
             raise CmmUqError(f"has deviations in {unit!r}", where=where, fix="Export them in micrometres")
         names = ["owner", "filetype"] + ["file type"] * ("renishaw" in kind.lower())  # else its owner is its kind
         if not {self.facts.get(name, "").lower() for name in names} & _LINEAR:
@@ -314,7 +304,7 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     ]
     axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
     ways = senses(labels, target.tolist())
-    parts = [part for label in labels for part in (label, *parts_of(label))]
+    parts = [one for label in labels for one in (label, *run_apart(label, lengths=True), *parts_of(label))]
     run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
     key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
     numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
@@ -362,12 +352,9 @@ def _axis_of(sheets: Sequence[Sheet]) -> str:
     return next(filter(None, map(axis_in, texts)), "1")
 
 
-_AXIS_NAMES = "XYZ"
-
-
 def axis_place(name: str) -> tuple[str, str]:
     """Where an axis of runs lies, as far as its name says, and an example: it reads 0 where it lies at 0."""
-    axis = name if name in _AXIS_NAMES else ""
-    known = ",".join("0" if one == axis else "?" for one in _AXIS_NAMES)
-    begins = ",".join("0" if one == (axis or "X") else str(100 * k) for k, one in enumerate(_AXIS_NAMES, 1))
+    axis = name if name in "XYZ" else ""
+    known = ",".join("0" if one == axis else "?" for one in "XYZ")
+    begins = ",".join("0" if one == (axis or "X") else str(100 * k) for k, one in enumerate("XYZ", 1))
     return f"along {axis} from {known}" if axis else "", f"along {axis or 'X'} from {begins}"

@@ -84,9 +84,7 @@ class Dimension:
     name: str
     text: str  # what it is of, after its name
     line: int
-    rows: dict[
-        str, tuple[str, dict[str, int], str]
-    ]  # by axis, its line, where a heading's words end, place in messages
+    rows: dict[str, tuple[str, dict[str, int], str]]  # by axis: line, ends of its heading's words, place in messages
 
     def measured(self, axis: str) -> str:
         """The figure below MEAS, which differs from that below NOMINAL by that below DEV where these are printed."""

@@ -23,34 +23,13 @@ from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim, commas, names, say
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, REQUIRED, WHOLE, largest, misnamed
+from cmm_uq.jobs.importing import format as formats, header as heads
 from cmm_uq.jobs.importing.answers import head_of
 from cmm_uq.jobs.importing.cells.encodings import is_number
 from cmm_uq.jobs.importing.cells.figures import SMALL
 from cmm_uq.jobs.importing.columns import columns_of
-from cmm_uq.jobs.importing.format import (
-    Fact,
-    FileKeys,
-    Format,
-    ImportKeys,
-    NotReadError,
-    Recognition,
-    Sheet,
-    format_of,
-    length_named,
-    sheets_of,
-)
-from cmm_uq.jobs.importing.header import (
-    LINES_BEFORE,
-    POINTS,
-    REFERENCES,
-    Header,
-    header_of,
-    names_axes,
-    no_header,
-    plain_words,
-    without_unit,
-    words_of,
-)
+from cmm_uq.jobs.importing.format import Fact, Format, ImportKeys, NotReadError, Recognition, Sheet
+from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, axis_runs, placed, placed_runs
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
@@ -196,13 +175,13 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
     return replace(table, columns=used, recognised=recognised)
 
 
-def imported_references(content: bytes, where: str, keys: FileKeys) -> ImportedTable:
+def imported_references(content: bytes, where: str, keys: formats.FileKeys) -> ImportedTable:
     """Certified values in any format that is known: distances or places, by the number of their point."""
-    every = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
+    every = ImportKeys.model_validate({name: getattr(keys, name) for name in formats.FileKeys.model_fields})
     try:
         table = _imported(content, where, every, REFERENCES, None)
     except NotReadError as error:
-        lengths = _lengths_headed(_sheets_of(format_of(content, where), content, where, every))
+        lengths = _lengths_headed(_sheets_of(formats.format_of(content, where), content, where, every))
         if len(lengths) != 1 or every.columns.keys() & {"reference_mm"}:
             problem, fix = ((text or "").replace("x_mm", "reference_mm", 1) for text in (error.problem, error.fix))
             raise NotReadError(problem, where=error.where, fix=fix) from None
@@ -214,9 +193,10 @@ def imported_references(content: bytes, where: str, keys: FileKeys) -> ImportedT
 
 def _lengths_headed(sheets: Sequence[Sheet]) -> set[str]:
     """Headings that say a length and no more: on a certificate the certified one."""
-    words = words_of("lengths")["length"]
+    words = heads.words_of("lengths")["length"]
     texts = (cell for sheet in sheets for row in sheet.rows[:LINES_BEFORE] for cell in row if isinstance(cell, str))
-    return {text for text in texts if " ".join(plain_words(without_unit(text.replace("_", " "))[0])) in words}
+    each = ((text, heads.without_unit(text.replace("_", " "))[0]) for text in texts)
+    return {text for text, plain in each if " ".join(heads.plain_words(plain)) in words}
 
 
 def _imported(
@@ -225,14 +205,14 @@ def _imported(
     if len(content) > TABLE_BYTES.most:
         large = f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file"
         raise CmmUqError(large, where=where, fix="Split it")
-    form, file = format_of(content, where), PurePath(where).name
+    form, file = formats.format_of(content, where), PurePath(where).name
     recognised = Recognition(file, form.name, form.title, (), {}, 0)
     problem: NotReadError | None = None
     try:
         sheets = _sheets_of(form, content, where, keys)
         sheet, header = _chosen(sheets, keys, where, wanted)
         if sheet.rows[header.row] in sheet.rows[header.row + 1 :] or any(
-            map(names_axes, sheet.rows[header.first + 1 :])
+            map(heads.names_axes, sheet.rows[header.first + 1 :])
         ):
             raise NotReadError("its head comes again", where=sheet.at(where, header.row), fix="Export one table")
         head = tuple(head_of(sheet.rows[header.row])) if header.row < header.first else ()
@@ -243,7 +223,7 @@ def _imported(
         understood = understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines)
         if understood is not None:
             return _understood(understood, keys, where, reach_mm, recognised)
-    raise problem or no_header(sheets, keys, where, wanted)
+    raise problem or heads.no_header(sheets, keys, where, wanted)
 
 
 def _understood(
@@ -298,7 +278,7 @@ def _points(
 
 def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet], list[tuple[Sheet, Header]]]:
     """Sheets of a file, and its table with its header; none where it is not understood."""
-    form = format_of(content, where)
+    form = formats.format_of(content, where)
     sheets = _sheets_of(form, content, where, keys)
     with suppress(CmmUqError):
         sheet, header = _chosen(sheets, keys, where, POINTS)
@@ -311,7 +291,7 @@ def tables_in(content: bytes, where: str, keys: ImportKeys) -> tuple[list[Sheet]
                 columns, _ = found.points(keys, where, None)
                 cells = ([f"{cell:.9g}" for cell in row] for row in zip(*columns.values(), strict=True))
                 rows = [("", row, line) for row, line in zip(cells, found.reading.lines, strict=True)]
-                sheets = sheets_of(rows, [*columns], unit="mm")
+                sheets = formats.sheets_of(rows, [*columns], unit="mm")
                 return sheets, [(sheets[0], Header(0, 1, [*columns], {name: (i,) for i, name in enumerate(columns)}))]
             return [*found.sheets], [(found.grid.sheet, found.header)]
     return sheets, []
@@ -327,7 +307,7 @@ def _with_unit(sheet: Sheet) -> Sheet:
     for row, below in zip_longest(rows, rows[1:], fillvalue=()):  # which may stand below its word
         text = ";".join(map(str, row))
         match = _UNIT_LINE.search(f"{text} {below[0]}" if len(row) == len(below) == 1 and text[-1:] == ":" else text)
-        if match and (unit := length_named(match[1].strip("[]().,;"))) and unit.name not in SMALL:
+        if match and (unit := formats.length_named(match[1].strip("[]().,;"))) and unit.name not in SMALL:
             return replace(sheet, unit=unit.name)
         if sum(cell != "" and is_number(cell) for cell in row) > 1:
             break
@@ -346,7 +326,7 @@ def _chosen(
             raise CmmUqError(f"has no sheet {keys.sheet!r}", where=where, fix=fix)
     tables = [(sheet, header) for sheet in sheets if (header := header_of(sheet, keys, where, wanted)) is not None]
     if not tables:
-        raise no_header(sheets, keys, where, wanted)
+        raise heads.no_header(sheets, keys, where, wanted)
     if len(tables) > 1:
         listed = ", ".join(repr(sheet.name) for sheet, _ in tables)
         raise (CmmUqError if tables[0][0].listed else NotReadError)(

@@ -161,9 +161,7 @@ class SheetReading:
     blank: list[tuple[int, int]] = field(default_factory=list)  # row and column of measured values that are not there
     bare: Sequence[int] = ()  # numbers of columns that no head names
     others: Sequence[int] = ()  # rows that belong to it
-    beside_lengths: bool = (
-        False  # whether they are places that stand beside something else, as where a length was measured
-    )
+    beside_lengths: bool = False  # whether they are places beside something else, as where a length was measured
     summaries: list[int] = field(default_factory=list)  # rows of another table, of means of this one
     beside: list[Labels] = field(default_factory=list)  # of each row
     further: dict[str, Floats] = field(default_factory=dict)

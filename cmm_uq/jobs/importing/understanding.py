@@ -21,12 +21,12 @@ from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading
 from cmm_uq.jobs.importing.cells import left_out
-from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
+from cmm_uq.jobs.importing.cells.figures import metric, unit_elsewhere
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
 from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
-from cmm_uq.jobs.importing.grouping import places
+from cmm_uq.jobs.importing.grouping import on_a_plate, places
 from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary, shown
 from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of, take_certified
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
@@ -40,6 +40,7 @@ from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, joined, said_by
 
 _COMPARED = 5000  # points of sheets
+_AIRCRAFT = 100.0  # inches, that points which are none of an artefact may be apart
 ROWS_MOST = 20_000  # of a sheet that is understood this way
 Found = tuple[SheetReading, CutSheet]
 
@@ -187,12 +188,7 @@ def _refuse_same_lines(chosen: Sequence[Found], where: str) -> None:
     words = any(hint(name, lengths=True) or axis_in(name) or name.strip().upper() in {*"XYZ"} for name in sheets)
     hinted = words or len({re.sub(r"\d+", "0", name) for name in sheets}) == 1
     first, *others = sheets or [""]
-    if (
-        not hinted
-        and others
-        and any(map(bool, sheets[first]))
-        and any(sheets[first] == sheets[other] for other in others)
-    ):
+    if not hinted and any(any(map(bool, sheets[first])) and sheets[first] == sheets[other] for other in others):
         what = f"sheets {', '.join(map(repr, sheets))} hold lengths of the same names, each a recording of its own"
         raise NotReadError(what, where=where, fix=f'Say which: sheet = "{first}"')
 
@@ -232,16 +228,11 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
                 reading = read(grid, blocks, own if read in lengths else of_places)
             except EitherError as error:
                 problem, reading = problem or error, None
-            if reading is not None and (
-                (not placed and passes_over_axes(reading, blocks[0].paths)) or (across and few_of(reading, grid, own))
-            ):
+            if reading is None or (not placed and passes_over_axes(reading, blocks[0].paths)):
                 continue
             # of a turned sheet words must say which lengths, or targets, those that were measured are of
-            if reading is not None and (
-                reading.called
-                or not across
-                or (bool(reading.checked) if reading.kind == "lengths" else reading.kind == "runs" or not reading.bare)
-            ):
+            sure = bool(reading.checked) if reading.kind == "lengths" else reading.kind == "runs" or not reading.bare
+            if not across or ((reading.called or sure) and not few_of(reading, grid, own)):
                 readings.append(reading)
                 # else they are places of lines or of features, or a few rows that were taken for others
                 if 2 * len({*reading.rows, *reading.others}) > len(own) and not reading.beside_lengths:
@@ -308,6 +299,11 @@ class Understanding:
             system = formats.UNITS["inch" if small.name == "microinch" else "mm"]
             stated = [(system, say("as its deviations are in {unit}", unit=Verbatim(small.name)))]
         figures, points = np.array(self.reading.figures).T, self.reading.kind == "points"
+        largest = float(np.nanmax(np.ptp(figures, axis=1) if points else figures))
+        if points and not on_a_plate(figures.T[np.unique(places(figures.T), return_index=True)[1]]):
+            largest = min(largest, _AIRCRAFT)
+        if not stated and metric(self.sheets, self.grid.sign, largest):
+            stated = [(formats.UNITS["mm"], say("as the texts of the file are of those who measure in mm"))]
         named = zip(COORDINATES if points else ("reference_mm", "length_mm"), figures, strict=True)
         written = {name: [(own, None, 0)] for name, own in named if np.isfinite(own).all()}
         return settled_unit(stated, where, lambda: by_extent(written, where, reach_mm))

@@ -56,6 +56,59 @@ def test_numbers_of_lengths_are_no_lines_though_they_are_called_positions() -> N
     assert [len(own) for own in read(lengths_of(rows))] == [6, 6]
 
 
+@pytest.mark.parametrize(
+    "title",
+    ["POSITION {i}   RUN {r}", "Run {r} - Position {i}", "*** Line {i} (repeat {r} of 3) ***", "Position {i} ({r}/3)",
+     "Messlinie {i}, Wiederholung Nr. {r}", "{r}. Lauf, Position {i}", "【測定位置 {i}】 {r}回目", "测量线{i} 第{r}次",
+     "Posizione {i} : prova n° {r}", "POS{i}-RUN{r}", "Line {i}, measurement {r}"],
+)  # fmt: skip
+def test_a_run_in_a_title_beside_the_name_of_a_line_is_a_run(title: str) -> None:
+    rows = ["Unit: mm"]
+    for i in range(2):
+        for r in range(3):
+            each = (f"{k + 1};{LENGTHS[k]};{measured(i, k, r)};{error(i, k, r) / 1000:.4f}" for k in range(4))
+            rows += [title.format(i=i + 1, r=r + 1), "No;Nominal;Actual;Deviation", *each, "Max. dev. (abs);;;0.0014"]
+    assert read(lengths_of(rows)) == expected(2)
+
+
+def test_each_word_of_a_head_is_over_its_part_of_what_stands_below_it() -> None:
+    rows = ["Pos/Step/Rep;Nominal (mm);Measured (mm)"]
+    rows += [
+        f"{i + 1}/{k + 1}/{r + 1};{LENGTHS[k]};{measured(i, k, r)}"
+        for i in range(2)
+        for k in range(4)
+        for r in range(3)
+    ]
+    assert read(lengths_of(rows)) == expected(2)
+
+
+def test_what_is_permitted_and_what_is_not_corrected_are_no_deviations_and_no_lengths() -> None:
+    rows = ["Linie;Lauf;Kalibrierlänge;Messwert unkorrigiert;Messwert korrigiert;Abweichung µm;zulässige Abweichung µm"]
+    for i in range(2):
+        for r in range(3):
+            for k, length in enumerate(LENGTHS):
+                own = measured(i, k, r)
+                each = (f"{float(own) + length * 8e-6:.4f}", own, f"{error(i, k, r):.1f}", f"{2 + length / 300:.1f}")
+                rows.append(f"{i + 1};{r + 1};{length};{';'.join(each)}")
+    assert read(lengths_of(rows)) == expected(2)
+
+
+@pytest.mark.parametrize(
+    ("words", "known"),
+    [
+        ("Line;Run;Calibrated;Measured", False),
+        ("Linie;Lauf;Kalibriert;Messwert", True),
+        ("測定線;回;校正値;測定値", True),
+    ],
+)
+def test_a_language_whose_speakers_measure_in_mm_says_the_unit(words: str, known: bool) -> None:
+    rows = [words] + [
+        f"{i + 1};{r + 1};{LENGTHS[k]};{measured(i, k, r)}" for i in range(2) for k in range(4) for r in (0, 1)
+    ]
+    with pytest.raises(CmmUqError, match="nothing says where" if known else "may be in mm or in inch"):
+        imported("\n".join(rows).encode(), "e0.csv", ImportKeys())
+
+
 def test_references_that_are_measured_anew_each_time_are_of_one_length() -> None:
     rows = ["Pos.;Longitud nominal (mm);Repetición;Longitud láser (mm);Lectura MMC (mm);Error (µm)"]
     for i in range(3):

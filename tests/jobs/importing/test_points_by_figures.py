@@ -236,3 +236,33 @@ def test_coarse_places_of_balls_beside_a_fine_length_say_where_it_lay() -> None:
     lengths = [25.4 * (19.68520 + (7 * k % 13) / 1e5) for k in range(20)]
     np.testing.assert_allclose(np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1), lengths, rtol=1e-9)
     assert ends[0, 0].tolist() == pytest.approx([152.4, 457.2, 254.0])
+
+
+def in_own_coordinates(head: str) -> list[list[str]]:
+    """A plate in two placements, twice each, all in its own coordinates: below a head of placement, run and ball."""
+    random = np.random.default_rng(7)
+    balls = [(133.0 * (k % 3), 133.0 * (k // 3), 0.0) for k in range(9)]
+    return [[*head.split(";"), "X [mm]", "Y [mm]", "Z [mm]"]] + [
+        [name, f"{run}", f"K{k + 1}", *(f"{value + random.normal(0, 0.001):.4f}" for value in ball)]
+        for name in ("A0B0", "A90B180")
+        for run in (1, 2)
+        for k, ball in enumerate(balls)
+    ]
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["Setup;Run;Ball", "Station;Measurement;Ball", "Head;Pass;Sphere", "Aufspannung;Messung;Kugel", "装夹;次;球"],
+)
+def test_placements_of_what_has_coordinates_of_its_own_are_no_repeats(head: str) -> None:
+    found = read(in_own_coordinates(head)).columns
+    numbers = sorted({*zip(*(found[name].tolist() for name in ("measurement", "point", "repeat")), strict=True)})
+    assert numbers == [(m, p, r) for m in (1, 2) for p in range(1, 10) for r in (1, 2)]
+
+
+def test_what_may_be_placements_or_repeats_at_the_same_places_is_asked() -> None:
+    table = in_own_coordinates("Bade;Fiku;Kugel")
+    with pytest.raises(CmmUqError, match="which points belong to one measurement"):
+        read([[row[0], *row[2:]] for row in table if row[1] != "2"])
+    with pytest.raises(CmmUqError, match="which points belong to one measurement"):
+        read(table)

@@ -425,7 +425,7 @@ def test_nominal_values_alone_are_no_points() -> None:
 
 
 def test_a_column_that_is_called_otherwise_says_no_unit() -> None:
-    text = "Element;Achse;Ist;Status\nKugel 1;X;1500.5;M\nKugel 1;Y;2.5;M\nKugel 1;Z;3.5;M\n"
+    text = "Element;Axis;Actual;Status\nBall 1;X;1500.5;M\nBall 1;Y;2.5;M\nBall 1;Z;3.5;M\n"
     assert xyz(read(text, points_per_measurement=1, unit="mm")) == [[1500.5, 2.5, 3.5]]
     with pytest.raises(CmmUqError, match="nothing says the unit"):
         read(f"{text}Kugel 2;X;900.5;M\nKugel 2;Y;2.5;M\nKugel 2;Z;3.5;M\n", points_per_measurement=2)

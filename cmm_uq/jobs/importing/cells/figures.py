@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.jobs.importing.factors import LINE, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Sheet, WrittenUnit, apart, unit_named
-from cmm_uq.jobs.importing.header import without_unit
+from cmm_uq.jobs.importing.header import plain_words, without_unit, words_of
 
 _FIGURE = re.compile(r"[±<>≤≥~]?\s*([+-]?\d[\d .,'’]*|[+-]?[.,]\d+)(?:[eE][+-]?\d+)?")
 _GROUPS = {sign: re.compile(rf"(?<=\d)[{other} '’](?=\d{{3}})") for sign, other in ((",", "."), (".", ","))}
@@ -18,6 +18,16 @@ _PLAIN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _DECIMAL = re.compile(r"^[^\d]*\d+[.,]\d+\D*$")
 _SAYS_UNIT = re.compile(r"\bunits?\s*[=:]\s*(\w+)", re.IGNORECASE)
 _MENTION = re.compile(r"[^\W\d_]+|µ\w+|\"")
+_SCRIPT = re.compile("[\u0400-\u04ff\u3040-\u30ff\u4e00-\u9fff\uac00-\ud7a3]")  # of no language that measures in inches
+_ACCENTED = re.compile("[à-öø-ÿā-ž]")
+# dates with the day or the year first, and temperatures in °C
+_ELSEWHERE = re.compile(
+    r"\b(?:1[3-9]|2\d|3[01])[/-]\d{1,2}[/-]\d{2,4}\b|\b\d{1,2}\.\d{1,2}\.(?:19|20)\d\d\b|\b\d{1,2}-[a-z]{3}-\d{4}|°\s?C\b"
+    r"|\btemp[^\d\n]{0,30}\b(?:1[5-9]|2[0-8])[.,]\d",
+    re.IGNORECASE,
+)
+_INCHES = re.compile(r"\b(?:inch|inches|zoll|pouces?|pollici|pulgadas?)\b", re.IGNORECASE)
+_LONG_IN, _LONGEST_IN = 40.0, 120.0  # few artefacts are longer, and none
 SMALL = ("um", "nm", "microinch")  # units of deviations
 _POWER = 99  # of ten, beyond which a text is no figure
 _LETTERED = re.compile(r"\s[A-Z]\s*$")  # which names, and is no unit
@@ -71,3 +81,19 @@ def unit_elsewhere(sheets: Sequence[Sheet], *, small: bool) -> WrittenUnit | Non
         if len(named) == 1:
             return UNITS[named.pop()]
     return None
+
+
+def metric(sheets: Sequence[Sheet], sign: str, largest: float) -> bool:
+    """Whether texts are of those who measure in mm: by decimal comma or script, by words of another language, or dates and °C.
+
+    largest : figure, which in inches is the longer than artefacts are the less it needs.
+    """
+    text = "\n".join(" ".join(map(str, row)) for sheet in sheets for row in (*sheet.rows, (sheet.name,)))
+    if _INCHES.search(text):
+        return False
+    words = {*re.findall(r"[^\W\d_]{3,}", text.casefold())}
+    others = {word for word in words if _ACCENTED.search(word)}
+    others |= {word for word in words if not words_of("metric")["words"].isdisjoint(plain_words(word))}
+    if sign == "," or _SCRIPT.search(text) is not None or (len(others) > 1 and largest > _LONG_IN):
+        return True
+    return largest > _LONGEST_IN and _ELSEWHERE.search(text) is not None

@@ -11,9 +11,7 @@ from cmm_uq.jobs.importing.lengths.places import said_in
 _TOKEN, _PHRASE = re.compile(r"(?:(?![:=|]+(?=\s))\S+)"), re.compile(r"\S+(?: \S+)*")
 _BETWEEN = re.compile(r"(?<=\s)[:|](?=\s)")  # columns
 _POINT = re.compile("[.,]")
-_WIDE = re.compile(
-    "[\u1100-\u115f\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe4f\uff00-\uff60\uffe0-\uffe6]"
-)  # as two
+_WIDE = re.compile("[\u1100-\u115f\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe4f\uff00-\uff60\uffe0-\uffe6]")
 _HELD = "\0"  # beside a character that is printed as wide as two
 _NUMBER = re.compile(r"[±+-]?\d[\d.,]*(?:%|[eE][+-]?\d+)?|[±+-]?[.,]\d+")
 _MIXED = re.compile(r"\s[±+-]?\d*[.,]\d|[\d.,]\s+[±+-]?\d")  # figures that one blank parts from others

@@ -52,7 +52,8 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     taken = rows | {r for one in readings for r in one.others}
     summed = {r for one in readings for r in one.summaries}
     heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
-    cells = (c for row in taken for c in (*grid.sheet.rows[row], *grid.block_of[row].titles[row].values()))
+    texts = [row for row in range(min(taken), last) if grid.kinds[row] == "text" and not grid.place(row)]
+    cells = (cell for row in (*taken, *texts) for cell in grid.sheet.rows[row])
     if any(isinstance(cell, str) and _SEVERAL.search(cell) for cell in cells):
         return None  # cells that were not cut apart
     told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
@@ -68,9 +69,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
         if row in taken or grid.kinds[row] != "figures":
             continue
         figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in columns)]
-        within = (
-            first <= row < last or 0 < grid.sheet.lines[row] - grid.sheet.lines[last] == row - last
-        )  # without a gap
+        within = first <= row < last or 0 < grid.sheet.lines[row] - grid.sheet.lines[last] == row - last  # no gap
         within |= readings[0].kind == "points" and row > first and columns <= {*figures}
         known = row in summed or (readings[0].kind == "points" and of_feature(grid, row))
         if figures and within and not known and not _explained(grid, row, figures, rows, columns):

@@ -53,10 +53,8 @@ def steady(measured: FigureColumn, deviation: FigureColumn) -> FigureColumn | No
     for f in deviation.factors(measured):
         own, slack = measured.values - deviation.values * f, deviation.slack(measured, measured, f)
         if len(own) >= _LEAST and np.ptp(own) <= 2 * slack and np.ptp(deviation.values * f) > 4 * slack:
-            digits = round(-np.log10(measured.step))
-            return replace(
-                measured, i=-1, values=np.full(len(own), round(float(np.median(own)), digits)), role="reference"
-            )
+            value = round(float(np.median(own)), round(-np.log10(measured.step)))
+            return replace(measured, i=-1, values=np.full(len(own), value), role="reference")
     return None
 
 
@@ -85,9 +83,8 @@ def families(columns: Sequence[FigureColumn]) -> list[list[FigureColumn]]:
 def without_derived(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
     """Columns that are no mean, range, deviation or extreme of others."""
     left = [*columns]
-    several = {
-        c.i for own in families(columns) if len(own) > 1 for c in own
-    }  # of few rows one may be the largest by chance
+    # of few rows one may be the largest by chance
+    several = {c.i for own in families(columns) if len(own) > 1 for c in own}
     for c in columns:
         if c.i in several and c.role != "summary" and len(c.values) < _MANY:
             continue
@@ -141,9 +138,8 @@ def _certified(grids: Sequence[CutSheet]) -> dict[float, tuple[float, str]]:
                 both = np.array([[(grid.figure(row, k) or (np.nan,))[0] for k in range(grid.width)] for row in (a, b)])
                 pairs.append((*both[:, np.isfinite(both).all(axis=0)], grid.text(b, 0)))
         for nominal, calibrated, name in pairs:
-            for one, of_it in (
-                zip(nominal.tolist(), calibrated.tolist(), strict=True) if like(nominal, calibrated) else ()
-            ):
+            each_one = zip(nominal.tolist(), calibrated.tolist(), strict=True) if like(nominal, calibrated) else ()
+            for one, of_it in each_one:
                 found.setdefault(one, set()).add((of_it, name))
     alone = all(len({value for value, _ in own}) == 1 for own in found.values())
     return {nominal: own.pop() for nominal, own in found.items()} if alone else {}

@@ -17,15 +17,8 @@ from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import figure, unit_of
 from cmm_uq.jobs.importing.factors import hint, numberless
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, WrittenUnit
-from cmm_uq.jobs.importing.lengths.evidence import (
-    Difference,
-    differences,
-    families,
-    follows,
-    scatters,
-    steady,
-    without_derived,
-)
+from cmm_uq.jobs.importing.lengths import evidence
+from cmm_uq.jobs.importing.lengths.evidence import Difference, differences, families, follows, without_derived
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said, said_by
 
 BASES = ("reference", "nominal", "target")
@@ -88,7 +81,7 @@ def _sized(column: FigureColumn) -> bool:
 def _alone(column: FigureColumn, columns: Sequence[FigureColumn]) -> bool:
     """Whether words call it a length, or a deviation beside it has one reference."""
     called = column.role in (*BASES, "measured") or column.is_length
-    return called or any(c.role == "deviation" and steady(column, c) for c in columns)
+    return called or any(c.role == "deviation" and evidence.steady(column, c) for c in columns)
 
 
 def _refuse_far(grid: CutSheet, rows: Sequence[int], groups: Sequence[Sequence[FigureColumn]]) -> None:
@@ -110,7 +103,7 @@ def settled_base(group: Sequence[FigureColumn], pairs: Sequence[Difference]) -> 
         return stated
     of: dict[int, set[int]] = {c.i: set() for c in group}
     for _, a, b in pairs:
-        turned = not scatters(a, b) and _rank(a) < _rank(b) + scatters(b, a)
+        turned = not evidence.scatters(a, b) and _rank(a) < _rank(b) + evidence.scatters(b, a)
         if b.stated or (turned and not a.stated):
             a, b = b, a
         of[b.i] |= set() if b.stated else {a.i}
@@ -137,7 +130,7 @@ def _base(
     named = [c for c in group if c.role in BASES]
     measured = [c for c in group if c.role == "measured"]
     open_ = without_derived([c for c in group if c.role is None])
-    again = [c for c in (*named, *open_) if any(scatters(o, c) for o in group)]
+    again = [c for c in (*named, *open_) if any(evidence.scatters(o, c) for o in group)]
     fine = [c for c in again if not c.round]
     base = base or min((c for c in named if c.role == "reference"), key=lambda c: c.round, default=None)
     if base is None and len(fine) == 1:
@@ -145,13 +138,19 @@ def _base(
     elif base is None and named and measured and any(c.step < 1 for c in open_):
         return None  # which of both is calibrated nobody says
     base = base or next(iter((*named, *(again if not fine else ()))), None)
-    if base is None and len(group) == len(open_) == 1 and any(c.deviates and not steady(group[0], c) for c in small):
+    if (
+        base is None
+        and len(group) == len(open_) == 1
+        and any(c.deviates and not evidence.steady(group[0], c) for c in small)
+    ):
         base = open_[0]
     elif base is None and open_ and len(group) > len(open_):
         return None
-    rest = [c for c in group if c is not base and (c not in named or (base is not None and scatters(c, base)))]
+    rest = [c for c in group if c is not base and (c not in named or (base is not None and evidence.scatters(c, base)))]
     rest = [c for c in rest if c.role == "measured" or base is None or c.step < min(1, 20 * base.step)]
     rest = [c for c in rest if c.role == "measured"] or [c for c in rest if base is None or not follows(c, base)]
+    own = [c for c in rest if any(c is a and b is base for _, a, b in pairs)]
+    rest = own if len(own) == 1 and not side_by_side(rest) else rest  # what is not corrected has no deviation
     return base, without_derived(rest) or rest
 
 
@@ -166,6 +165,9 @@ def _lengths(
     if (found := _base(group, small, grid.at(rows[0]))) is None:
         return None
     base, source = found
+    alike = next((own for own in families(columns) if base in own and base.role in BASES), []) if base else []
+    if base and sum(not like(base.values, c.values) for c in alike) > 1:
+        return None  # targets side by side, of which each has a column
     deviations, checked, factor = base is not None and not source, 0, 0.0
     if base is not None and not source:
         source = _deviations(grid, rows, [c for c in columns if c not in group], small, base)
@@ -174,10 +176,12 @@ def _lengths(
     if not deviations:
         checked += sum(c.sums_up(source, worst=True) for c in columns if c.role == "summary")
         whole = source if len(source) == 1 else [c for c in group if c not in source and c.sums_up(source)]
-        of_all = [steady(m, c) for m in whole for c in columns if c in small or c.minute] if base is None else []
-        checked += sum(map(bool, of_all))
+        single = (
+            [evidence.steady(m, c) for m in whole for c in columns if c in small or c.minute] if base is None else []
+        )
+        checked += sum(map(bool, single))
         mean = np.mean([c.values for c in source])  # of which no calibration is known
-        known = (one for one in of_all if one is not None and abs(one.values[0] - mean) > 1.05 * one.step)
+        known = (one for one in single if one is not None and abs(one.values[0] - mean) > 1.05 * one.step)
         base = base or _reference_in_head(grid, rows, source) or next(known, None)
     named = {c.unit.name for c in source if c.unit} if deviations else set()
     source = source if side_by_side(source) else counted_heads(source)
@@ -187,7 +191,7 @@ def _lengths(
     units = units or [u for c in small if c.unit and (u := _unit_by(c.unit, factor)) is not None]
     left = [c for c in group if c not in source and c is not base and c.role not in (*BASES, "summary")]
     left = [c for c in without_derived([*source, *left]) if c in left and not (base and follows(c, base))]
-    if any(c.step < 1 and c.full for c in left):
+    if any(c.step < 1 and c.full and not (checked and c.role == "measured" and len(source) == 1) for c in left):
         return None  # measured as well, for all that is known
     reading = SheetReading("lengths", units[0] if units else grid.unit_beside(rows), None, checked, deviations)
     reading.small = UNITS[named.pop()] if named else None
@@ -282,20 +286,18 @@ def _checked(
     hits: list[float] = []
     for d in (one for one in small if np.any(one.values)):
         own = [f for f in d.factors(source[0]) if _stands(d, source, base, f)]
-        if d.role == "deviation" and not own:
+        if d.role == "deviation" and not own and not (follows(d, base) and d.full):  # as what is permitted does
             what = f"{d.heading!r} is not measured minus reference: one of the columns is another"
             raise NotReadError(what, where=grid.at(rows[0]), fix=said_by("deviation_um", [d], ", or length_mm"))
         hits += own
     return len(hits), hits[-1] if hits else 0.0
 
 
-def _stands(d: FigureColumn, measured: Sequence[FigureColumn], base: FigureColumn, factor: float) -> bool:
+def _stands(d: FigureColumn, measured: Sequence[FigureColumn], base: FigureColumn, f: float) -> bool:
     """Whether a deviation is that of measured lengths, either way round, or of their mean, or of the worst of them."""
     step = base.step * (base.step < 1)
-    errors = [replace(m, values=(m.values - base.values) / factor, step=(m.step + step) / factor) for m in measured]
-    return d.sums_up(errors, worst=True) or any(
-        d.agrees(m, base, factor) or d.agrees(base, m, factor) for m in measured
-    )
+    errors = [replace(m, values=(m.values - base.values) / f, step=(m.step + step) / f) for m in measured]
+    return d.sums_up(errors, worst=True) or any(d.agrees(m, base, f) or d.agrees(base, m, f) for m in measured)
 
 
 def _reference_in_head(grid: CutSheet, rows: Sequence[int], measured: Sequence[FigureColumn]) -> FigureColumn | None:

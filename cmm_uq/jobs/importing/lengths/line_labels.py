@@ -8,22 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.jobs.importing.factors import (
-    LINE,
-    POINT,
-    RUN,
-    Counted,
-    Label,
-    codes,
-    counted,
-    counting,
-    fixes,
-    hint,
-    in_turn,
-    numbered_runs,
-    together,
-    varying,
-)
+from cmm_uq.jobs.importing import factors
+from cmm_uq.jobs.importing.factors import LINE, POINT, RUN, Counted, Label, codes, counted, counting, fixes, hint
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import plain_words, words_of
 from cmm_uq.jobs.importing.lengths.places import says_figures
@@ -45,29 +31,27 @@ def lengths_of(references: Floats) -> Ints:
 
 def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
     """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
-    count, several, found = len(reference), bool(reference.max(initial=0) > 0), varying(labels, lengths=True)
+    count, several, found = len(reference), bool(reference.max(initial=0) > 0), factors.varying(labels, lengths=True)
     if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
         found = [(f[0], f[1], RUN if f[0].sort == "head" and counting(f[0].values) else f[2]) for f in found]
     found = [(f[0], f[1], LINE if f[2] is None and _says_places(f[0]) else f[2]) for f in found]
     above = [f for f in found if f[0].sort in ("title", "sheet", "block") and not fixes(f[1], reference)]
     # numbers of the lengths of each line, though they are called positions
-    found = [
-        (f[0], f[1], POINT) if f[0].sort == "column" and _counts_lengths(f, above, reference) else f for f in found
-    ]
+    found = [(f[0], f[1], POINT) if f[0].sort == "column" and _counts_them(f, above, reference) else f for f in found]
     plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
     run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
     line: list[Counted] = []
     called = [f for f in plain if f[2] == LINE]
     for one in sorted(called, key=lambda f: (several and fixes(f[1], reference), f[0].sort == "part", -f[1].max())):
-        if not line or not fixes(together(*(f[1] for f in line)), one[1]):
+        if not line or not fixes(factors.together(*(f[1] for f in line)), one[1]):
             line.append(one)
     lined = any(f[2] == LINE for f in found)
     line, run = _told_apart(reference, [f for f in plain if f[2] in (None, POINT)], line, run, place, lined=lined)
     # else one length on each line, which are named and not counted
     line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
     _refuse_unnamed(found, line)
-    key = together(reference, *(f[1] for f in line))
-    each = key if run is None else together(key, run[1])
+    key = factors.together(reference, *(f[1] for f in line))
+    each = key if run is None else factors.together(key, run[1])
     if each.max() + 1 < count if run is not None else len({*Counter(key.tolist()).values()}) > 1:
         what = "lengths of one line and one run have the same nominal length"
         fix = 'Say what tells them apart: columns = { line = "…", repeat = "…" }'
@@ -75,7 +59,7 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     names = [" ".join(dict.fromkeys(parts)) for parts in zip(*(f[0].values for f in line), strict=True)]
     titles = [one for one in labels if one.sort == "title" and counted(one, lengths=True) == LINE]
     titled = [one.values[0] for one in labels if one.values[0] and (one.sort == "sheet" or one in titles)]
-    numbers = in_turn(key) if run is None else numbered_runs(run[0].values)
+    numbers = factors.in_turn(key) if run is None else factors.numbered_runs(run[0].values)
     used = [f[0].words for f in (*line, *([run] if run else []))]
     return names or [titled[-1] if titled else "1"] * count, numbers, used
 
@@ -85,12 +69,12 @@ def _says_places(label: Label) -> bool:
     return label.sort in ("title", "column") and any(map(says_figures, {*label.values}))
 
 
-def _counts_lengths(column: Counted, above: Sequence[Counted], reference: Ints) -> bool:
+def _counts_them(column: Counted, above: Sequence[Counted], reference: Ints) -> bool:
     """Whether a column numbers the lengths below each title, of lines where a word calls it a line itself."""
     label, own, of = column
     numbers = of == LINE or (of is None and _digits(label))
     titles = [f[1] for f in above if of is None or (f[2] == LINE and f[0].sort != "block")]
-    return numbers and any(fixes(together(one, own), reference) for one in titles)
+    return numbers and any(fixes(factors.together(one, own), reference) for one in titles)
 
 
 def _refuse_unnamed(found: Sequence[Counted], line: Sequence[Counted]) -> None:
@@ -111,7 +95,7 @@ def _told_apart(
 
     def apart(*more: Ints) -> int:
         """How many of the lengths are told apart."""
-        return int(together(reference, *(f[1] for f in line), *([run[1]] if run else []), *more).max()) + 1
+        return int(factors.together(reference, *(f[1] for f in line), *([run[1]] if run else []), *more).max()) + 1
 
     def order(f: Counted) -> tuple[bool, bool, int, int]:
         return f[2] == POINT, run is not None and fixes(f[1], run[1]), rank[f[0].sort], int(f[1].max())

@@ -81,12 +81,12 @@ def role_of(text: str, *, after: bool = False) -> str:
     words = plain_words(text)
     label = len(words) > 1 and re.search(r"(?<!\w)[A-Z]\W*$", text)  # as of ``ball A``
     least = {len(words) - (2 if label else 1), *([0] if after else [])}
-    turned = [(k, _role(word)) for k, word in enumerate(words) if len(word) > 2 or not word.isascii() or k in least][
+    found = [(k, _role(word)) for k, word in enumerate(words) if len(word) > 2 or not word.isascii() or k in least][
         ::-1
     ]
     # words after one for a direction are of something else
-    turned = [(k, role) for k, role in turned if role != DIRECTION or all(map(_short, words[k + 1 :]))]
-    return next((role for _, role in turned if role), "")
+    found = [(k, role) for k, role in found if role != DIRECTION or all(map(_short, words[k + 1 :]))]
+    return next((role for _, role in found if role), "")
 
 
 def _short(word: str) -> bool:
@@ -137,9 +137,8 @@ def said_in(texts: Iterable[str], sign: str = ".") -> Said:
         for start, end, values, to in _figures(plain, sign, planes):
             gap, place = plain[last:start], to is None or len(values) == 3
             role = role_of(re.split(r"\d", gap)[-1], after=before) or (END if before and _ARROW.search(gap) else "")
-            role = next(
-                (of for word, of in _BEHIND.items() if plain[end : end + 5].lstrip(" m").startswith(word)), role
-            )
+            behind = plain[end : end + 5].lstrip(" m")
+            role = next((of for word, of in _BEHIND.items() if behind.startswith(word)), role)
             role = DIRECTION if plain[start] in "iI" else "" if role in ANGLES else role
             if role == DIRECTION and len(values) == 3 and max(map(abs, values.values())) <= _VECTOR:
                 said.take(said.way, values)

@@ -44,11 +44,8 @@ def stated_places(
             most, alone = max(own.values()), max(own.values()) - shortest[name] < _NEAR_MM
             place = place_of_line(said, most / mm, _NEAR_MM / mm, others, alone=alone)
             if place and (name not in found or "?" not in place):
-                words = "; ".join(
-                    dict.fromkeys(
-                        one for text in (*own, "\n".join(more)) for one in text.split("\n") if says_figures(one)
-                    )
-                )
+                each = (one for text in (*own, *more) for one in text.split("\n") if says_figures(one))
+                words = "; ".join(dict.fromkeys(each))
                 found[name] = _in_mm(place, mm), words[:_SHOWN]
             if place and "?" not in place:
                 break

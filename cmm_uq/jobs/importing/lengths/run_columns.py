@@ -11,7 +11,7 @@ import numpy as np
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import Block, CutSheet
 from cmm_uq.jobs.importing.coordinates import OF_CIRCLES
-from cmm_uq.jobs.importing.factors import senses, way_of, ways_of
+from cmm_uq.jobs.importing.factors import RUN, hint, senses, way_of, ways_of
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, without_derived
 from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, settled_base
@@ -83,7 +83,10 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     small = [c for c in columns if c not in near and c.role != "summary"]
     if near and (base := settled_base(near, differences(near, small))) is not None:
         return base
-    large = [c for c in large if c.role is None and not way_of(c.heading)]
+    counting = [
+        c for c in large if c.role == "measured" and hint(c.heading, lengths=True) == RUN
+    ]  # ahead of runs across
+    large = [c for c in large if (c.role is None or c in counting) and not way_of(c.heading)]
     far = [c for c in large if np.ptp(c.values[np.isfinite(c.values)]) > 10 * _OFF_MM]
     return far[0] if len(far) == 1 else None
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmm_uq.jobs.importing.blocks import CutSheet
-from cmm_uq.jobs.importing.factors import LINE, hint
+from cmm_uq.jobs.importing.factors import LINE, RUN, hint
 from cmm_uq.jobs.importing.format import Cell, Sheet
+from cmm_uq.jobs.importing.header import filled_down, text_of
 from cmm_uq.jobs.importing.lengths.length_columns import BASES
 from cmm_uq.jobs.importing.roles import like, said
 
@@ -52,13 +53,14 @@ def turned(grid: CutSheet) -> Sheet | None:
             return None
         above = [grid.text(base, k) for k in range(first)]
         several = sum(map(bool, above)) > 1  # then each names what stands below it, and none the row
-        if several and not part.name and {"line", "run"} <= {hint(text, lengths=True) for text in above}:
+        if several and not part.name and RUN in {hint(text, lengths=True) for text in above}:
             fine = any((grid.figure(base, k) or (0, 1))[1] < _COARSE for k in part.columns)
             part.name = "reference" if fine else "nominal"  # figures among heads are what the lengths are called by
         for k in range(first):  # what stands ahead of rows becomes the head of columns
             names = [text for row in (*part.over, *part.beside) if (text := grid.text(row, k))] or [above[k]] * several
             texts = [grid.text(row, k) for row in (*part.over, *part.rows)]
             texts[: len(part.over)] = [""] * len(part.over)
+            texts[len(part.over) + 1 :] = [text_of(one) for one in filled_down(texts[len(part.over) + 1 :])]
             texts[len(part.over)] = part.name if several or not any(above) else above[k]
             named = f"{names[0]} {{}}" if names else "({})"
             line = bool(names) and hint(names[0], lengths=True) == LINE and len({*texts[len(part.over) + 1 :]}) > 1
