@@ -36,7 +36,8 @@ whole line is measured three times over, or each face three times before the nex
 *Hold*: 95 % intervals that contain the truth: of factors (all parameters of all effects), of sizes, of figures of
 performance (of a ballbar the mean over 400 repetitions with the noise drawn anew; of a gauge line its slope without noise).
 In brackets the exact binomial interval of 99.9 %, too narrow in that it takes intervals of one recording for independent.
-*Noisy axis*: the scale of the axis that reads worse. *Cries*: diagnoses other than consistent, all of them false."""
+*Noisy axis*: the scale of the axis that reads worse. *Cries*: diagnoses neither consistent nor
+undetermined, all of them false."""
 
 
 def page(found: Mapping[str, Tally], beside: Mapping[str, Tally], power: Path | None) -> str:

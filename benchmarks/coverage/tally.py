@@ -60,7 +60,7 @@ class Tally:
     recordings : done, faults included.
     quantities : of each quantity by its name, how often its interval holds the truth.
     noisy : the same of the scale of the axis that reads worse.
-    cries : recordings of which the diagnosis is other than consistent.
+    cries : recordings of which the diagnosis finds something; one that cannot tell noise of set-ups from it finds nothing.
     faults : what went wrong, and how often.
     seconds : of each recording.
     u : ln(u) of each quantity by recording.
@@ -81,7 +81,7 @@ class Tally:
         if "fault" in record:
             self.faults[record["fault"]] += 1
             return
-        self.cries.add(record["verdict"] != "consistent")
+        self.cries.add(record["verdict"] not in ("consistent", "undetermined"))
         for name, (_, u, low, high, truth) in record["intervals"].items():
             held = holds(name, low, high, truth)
             self.quantities[name].add(held)

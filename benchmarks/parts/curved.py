@@ -85,6 +85,7 @@ SORTS = (
     Sort("crashed", crashed=True),
     Sort("as the priors have it", by_prior=True),
     Sort("thermal", warm_k=0.5),
+    Sort("thermal, four times", warm_k=2.0),
 )
 PRIOR = {"along": 20.0, "across": 50.0, "turn": 30.0, "gap": 30.0, "wave": 10.0, "scale": 300.0, "square": 500.0}
 """What physics allows, in µm, ″ and ppm, as docs/machine/field.md states it."""

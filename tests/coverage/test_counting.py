@@ -39,7 +39,8 @@ def test_a_phase_holds_also_a_turn_further() -> None:
 
 def test_groups_the_noisy_axis_and_cries_are_counted_apart() -> None:
     records = [
-        record(0, {"scale_x.ppm": True, "scale_y.ppm": False, "artefact.length_mm": True, "lines.1.slope_ppm": False}),
+        record(0, {"scale_x.ppm": True, "scale_y.ppm": False, "artefact.length_mm": True, "lines.1.slope_ppm": False},
+               verdict="undetermined"),
         record(1, {"scale_x.ppm": False, "scale_y.ppm": True, "figures.mean_length_mm": True, "noise.coordinate_um": False},
                verdict="explained"),
     ]  # fmt: skip
