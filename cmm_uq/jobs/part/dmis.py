@@ -116,7 +116,7 @@ class _Program:
         self.tolerances: dict[str, tuple[int, list[str]]] = {}
         self.datums: dict[str, str] = {}
         self.styli: dict[str, Facts] = {}
-        self.mount, self.stylus = np.zeros(3), ""
+        self.mount, self.stylus, self.unit = np.zeros(3), "", False
         self.measuring: tuple[str, list[list[float]]] | None = None
         # line, features and tolerance of each output, with what the tolerance and the datums were at that line
         self.given: list[tuple[int, list[str], str, tuple[int, list[str]] | None, dict[str, str]]] = []
@@ -131,6 +131,9 @@ class _Program:
         for self.line, statement in said:
             if statement:
                 self._one(statement)
+        if not self.unit and (self.nominal or self.tolerances):
+            fix = "Say it before the first feature: UNITS/MM, ANGDEC"
+            raise CmmUqError("the program does not say its unit", where=self.where, fix=fix)
         for one in self.given:
             self._characteristic(*one)
         self._left_over()
@@ -181,6 +184,7 @@ class _Program:
         if self.nominal or self.tolerances:
             said = "the unit changes after features or tolerances were defined"
             raise CmmUqError(said, where=self.place, fix="Say UNITS once, at first")
+        self.unit = True
         self.frame = replace(self.frame, millimetres=MILLIMETRES[length.upper()], degrees=DEGREES[angle.upper()])
 
     def _feature(self, name: str, words: list[str]) -> Facts:

@@ -64,6 +64,7 @@ _NAMED: Mapping[str, str] = {
     "FeatureZoneIds": "is of a restricted zone of its feature, which is not read",
 }
 _PLAIN = ("", "NONE", "REGARDLESS", "NOT_APPLICABLE")  # material conditions that leave a tolerance or a datum as it is
+_ANGLE_DEG = 0.01  # by which a basic angle may be rounded
 _LENGTH_MM = 20.0  # of a plane or line whose length is not said: an example
 # ends of the names of elements that a plan or a model is made of; statistics, rules and resources have none
 _FEATURES = ("FeatureItem", "FeatureNominal")
@@ -263,7 +264,20 @@ class _Document:
         datums = self._datums(frame) if ASKS[what].datum_kinds and frame is not None else []
         if len(datums) < ASKS[what].datums:
             raise NotUnderstoodError("names no datum")
+        if what == "angularity":
+            for angle in (one.find("{*}Angle") for one in (nominal, definition)):
+                self._refuse_other_angle(features[0], datums[0].split(BETWEEN)[0], angle)
         return found | ({"datums": datums} if datums else {}) | self._limits(what, nominal, definition)
+
+    def _refuse_other_angle(self, feature: str, datum: str, angle: Element | None) -> None:
+        """Refuse a basic angle that is not that of the nominal directions, its complement or its supplement."""
+        at = {one["name"]: one["direction"] for one in self.drawing.features if "direction" in one}
+        if angle is None or not {feature, datum} <= at.keys():
+            return
+        said, cosine = self.units.degrees(angle), abs(sum(a * b for a, b in zip(at[feature], at[datum], strict=True)))
+        stand, folded = math.degrees(math.acos(min(cosine, 1.0))), abs((said + 90) % 180 - 90)
+        if min(abs(stand - folded), abs(90 - stand - folded)) > _ANGLE_DEG:
+            raise NotUnderstoodError(f"is an angularity of {said:g}°, and its nominal features stand at {stand:.4g}°")
 
     def _what(self, sort: str, nominal: Element) -> What:
         if sort == "LinearCoordinate":

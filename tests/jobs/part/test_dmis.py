@@ -52,6 +52,12 @@ def read(*parts: str) -> Drawing:
     return drawing_of_dmis("".join([HEAD, *parts, "ENDFIL\n"]).encode(), "plate.dmi")
 
 
+def test_a_program_without_a_unit_is_refused() -> None:
+    """It was read in mm: of a program in inches limits of 0.1 in were 0.1 mm."""
+    with pytest.raises(CmmUqError, match="does not say its unit"):
+        drawing_of_dmis("".join([HEAD.replace("UNITS/MM,ANGDEC\n", ""), TOP, BORE]).encode(), "plate.dmi")
+
+
 def named(tables: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     return {one["name"]: one for one in tables}
 

@@ -346,3 +346,22 @@ def test_a_model_with_product_information_gives_what_its_datums_and_tolerances_a
         ("B", "cylinder"), ("feature 122", "circle"), ("feature 129", "circle")]  # fmt: skip
     assert [(one["name"], one["features"]) for one in found.characteristics] == [
         ("holes 122", ["feature 122"]), ("holes 129", ["feature 129"])]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("angle", "read_so"), [("60", True), ("120", True), ("30", True), ("", True), ("45", False), ("61", False)]
+)
+def test_a_basic_angle_that_is_not_that_of_the_nominals_is_refused(angle: str, *, read_so: bool) -> None:
+    """It was evaluated at the angle of the nominal features, 60°, whatever the characteristic says."""
+    said = f"<Angle>{angle}</Angle>" * bool(angle)
+    slope = feature(6, "Plane", "slope", f"<Location>0 0 0</Location><Normal>{3**0.5 / 2} 0 0.5</Normal>")
+    asked = characteristic(7, "Angularity", "8", [6], said + zone(0.1, 3))
+    FEATURES.append(slope)
+    try:
+        found = read(asked, kind="Characteristics")
+    finally:
+        FEATURES.remove(slope)
+    assert ("8" in named(found.characteristics)) == read_so
+    assert [one.why for one in found.unknown] == ([] if read_so else [
+        f"is an angularity of {angle}°, and its nominal features stand at 60°"
+    ])  # fmt: skip
