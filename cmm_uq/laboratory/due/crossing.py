@@ -26,13 +26,13 @@ from cmm_uq.laboratory.records.facts import Series
 _HORIZON = drift.HORIZON * drift.YEAR
 
 
-def grid(gaps: int) -> Floats:
-    """Days after the last certificate, (gaps + 1,): none, a week, and as many times further each up to the horizon."""
-    return np.concatenate([[0.0], np.geomspace(7.0, _HORIZON, gaps)])
+DAYS = np.concatenate([[0.0], np.geomspace(7.0, _HORIZON, 48)])
+"""Days after the last certificate up to the horizon, for many machines whose dates are wide: a week, and a sixth more each."""
 
+FINE = np.concatenate([np.arange(0.0, 1120.0, 14.0), np.geomspace(1120.0, _HORIZON, 54)])
+"""The same for one machine: a fortnight each for three years, then a twentieth more."""
 
-DAYS, FINE = grid(48), grid(160)  # A sixth further each, for many machines whose dates are wide; a twentieth, for one
-PATHS = 2048
+PATHS = 1024
 _AT_ONCE = 2_000_000
 _GAPS = 15_000  # levels of paths that are moved together: they stay in the cache of a core
 _SEED = 20
@@ -114,14 +114,7 @@ class Crossing:
         }  # fmt: skip
 
 
-def crossing(
-    series: Series | drift.DriftHistory,
-    limit: float,
-    prior: drift.DriftPrior | None = None,
-    *,
-    until: float = _HORIZON,
-    enough: float = 1.0,
-) -> Crossing:
+def crossing(series: Series | drift.DriftHistory, limit: float, prior: drift.DriftPrior | None = None) -> Crossing:
     """When one machine's error will first be beyond its limit.
 
     Parameters
@@ -129,8 +122,6 @@ def crossing(
     series : of the records, or a history.
     limit : the error conforms while |error| ≤ limit.
     prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_model.FleetPrior.prior`), or none.
-    until : days after the last certificate that are looked at.
-    enough : probability beyond which nobody asks for the day.
 
     Raises
     ------
@@ -139,13 +130,12 @@ def crossing(
     if not (np.isfinite(limit) and limit > 0):
         raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
     known = series if isinstance(series, drift.DriftHistory) else drift.history(series)
-    return crossing_of(followed(known, limit, prior), limit, until, enough)
+    return crossing_of(followed(known, limit, prior), limit)
 
 
-def crossing_of(known: FollowedHistory, limit: float, until: float = _HORIZON, enough: float = 1.0) -> Crossing:
+def crossing_of(known: FollowedHistory, limit: float) -> Crossing:
     """The same of a history that was followed already."""
-    of = known.machines, known.prior, known.state, limit
-    return crossings(*of, until=until, days=FINE, enough=enough).one(0)
+    return crossings(known.machines, known.prior, known.state, limit, days=FINE).one(0)
 
 
 class _States(NamedTuple):
@@ -163,7 +153,7 @@ def crossings(
     machines: drift.Histories, prior: drift.DriftPrior, state: DriftState, limit: Floats | float, *,
     paths: int = PATHS, until: float = _HORIZON, days: Floats = DAYS, enough: float = 1.0,
 ) -> Crossings:  # fmt: skip
-    """When the errors of many machines will be; later than ``until`` days, or than all have ``enough``, it stays as it is."""
+    """When many errors will be; later than ``until`` days, or than the first has ``enough``, they stay as they are."""
     N, M = len(machines), state.log_weight.shape[2]
     c = 2 + len(prior.components)
     flat = _States(
@@ -248,7 +238,7 @@ def _probabilities(
         inside = crosses[-1]
         survival[:, start + 1 :] = (inside @ part)[:, None]
         survival[:, 1 + start : 1 + start + len(gap)] = (crosses @ part).T
-        if survival[:, -1].max() < 1 - enough:
+        if survival[:, -1].min() < 1 - enough:
             break
     return 1.0 - survival
 

@@ -13,7 +13,7 @@ which is what makes one machine's figures comparable with another's: docs/record
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -74,6 +74,9 @@ class DriftHistory:
         if (np.diff(self.day) < 0).any() or late:
             raise CmmUqError("the days of a history run backwards, or an adjustment comes after its certificate",
                              fix="Correct the dates")  # fmt: skip
+
+    def in_units(self, unit: float) -> DriftHistory:
+        return replace(self, value=self.value / unit, u=self.u / unit, u_artefact=self.u_artefact / unit)
 
 
 def history(series: Series | pd.DataFrame, adjusted_after: float | None = None) -> DriftHistory:

@@ -30,8 +30,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.laboratory.due import rule as rules
-from cmm_uq.laboratory.due.crossing import crossing
-from cmm_uq.laboratory.due.drift import HORIZON, YEAR, DriftPrior
+from cmm_uq.laboratory.due.crossing import FINE, crossings
+from cmm_uq.laboratory.due.drift import HORIZON, YEAR, DriftHistory, DriftPrior, default_prior, history, side_by_side
+from cmm_uq.laboratory.due.drift_filter import filtered
 from cmm_uq.laboratory.due.reliability import grouped, reliability_regression
 from cmm_uq.laboratory.due.rule import USUAL, IntervalBounds, Pool, Rule, calibrations, months_of
 from cmm_uq.laboratory.records.facts import RecordedCertificate, Series
@@ -234,6 +235,9 @@ def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Serie
     ])  # fmt: skip
 
 
+AT_ONCE = 4  # errors that are followed together: as many as a core's cache holds
+
+
 def drift_interval(
     certificates: Sequence[RecordedCertificate], reliability: float, priors: Mapping[str, DriftPrior]
 ) -> tuple[float, str, bool]:
@@ -248,17 +252,26 @@ def drift_interval(
     if not limited:
         raise CmmUqError(say("its certificate has no limits"))
     limited.sort(key=lambda each: -abs(each[0].value[-1]) / each[1])  # how soon the first crosses says how far to look
-    found: list[tuple[float, str, bool]] = []
+    together: dict[tuple[float, str], list[tuple[Series, DriftHistory, float]]] = {}
     refused: CmmUqError | None = None
-    for one, limit in limited:
-        soonest, part = min(found, default=(HORIZON * YEAR,))[0], 1 - reliability
+    for one, limit in limited:  # in units of its limit all that no fleet tells of have one prior
+        learnt = one.name if one.name in priors else ""
         try:
-            crossed = crossing(one, limit, priors.get(one.name), until=soonest + 1, enough=part).quantile(part)
+            own = history(one).in_units(1.0 if learnt else limit)
         except CmmUqError as error:
             refused = error
             continue
-        days = float("inf") if crossed is None else float((crossed - last.day).days)
-        found.append((days, one.quantity, one.name in priors))
+        together.setdefault((own.day[-1], learnt), []).append((one, own, limit if learnt else 1.0))
+    begin, part = last.day.toordinal(), 1 - reliability
+    found: list[tuple[float, str, bool]] = []
+    some = ((day, of[i : i + AT_ONCE]) for (day, _), of in together.items() for i in range(0, len(of), AT_ONCE))
+    for day, each in some:
+        prior = priors.get(each[0][0].name) or default_prior(1.0)
+        machines, limits = side_by_side([own for _, own, _ in each]), np.array([limit for *_, limit in each])
+        until = min(found, default=(HORIZON * YEAR,))[0] + begin - day + 1
+        crossed = crossings(machines, prior, filtered(machines, prior), limits, until=until, days=FINE, enough=part)
+        days = np.floor(crossed.quantile(part)) + day - begin
+        found += [(float(after), one.quantity, one.name in priors) for after, (one, *_) in zip(days, each, strict=True)]
     if not found:
         raise refused or CmmUqError(say("nothing in its history can be followed"))
     return min(found)

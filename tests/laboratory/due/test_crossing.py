@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ndtr
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.crossing import DAYS, Crossing, crossing, crossings
+from cmm_uq.laboratory.due.crossing import DAYS, PATHS, Crossing, crossing, crossings
 from cmm_uq.laboratory.due.drift import HORIZON, YEAR, history, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
 from tests.laboratory.due.histories import ALL, FIRST, machine, one_node, over_tales
@@ -26,7 +26,7 @@ def test_from_a_known_state_the_day_is_that_of_a_wiener_process_with_drift(rate:
     t, a = found.days[1:] / YEAR, 3.0
     s = walk * np.sqrt(t)
     exact = ndtr((rate * t - a) / s) + np.exp(2 * a * rate / walk**2) * ndtr((-a - rate * t) / s)
-    assert np.abs(found.probability[1:] - exact).max() < 3 * 0.5 / np.sqrt(2048)  # three standard errors of 2048 paths
+    assert np.abs(found.probability[1:] - exact).max() < 3 * 0.5 / np.sqrt(PATHS)  # three standard errors
 
 
 @pytest.mark.long
@@ -118,7 +118,7 @@ def test_the_lower_limit_is_watched_between_the_days_as_the_upper_is() -> None:
     for sign in (1.0, -1.0):
         arrays, prior = side_by_side([machine([0], [sign], EXACT)]), one_node(rate=sign, rate_sd=EXACT, walk=1.5)
         found.append(crossings(arrays, prior, filtered(arrays, prior), 4.0).probability[0])
-    assert np.abs(found[0] - found[1]).max() < 3 * np.sqrt(2) * 0.5 / np.sqrt(2048)
+    assert np.abs(found[0] - found[1]).max() < 3 * np.sqrt(2) * 0.5 / np.sqrt(PATHS)
 
 
 def test_quantiles_and_probabilities_are_each_other_s_inverse() -> None:
