@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.conformity.plans import ISO_10360_2, position_on, share_of_travel
 from cmm_uq.artefacts.gauge_lines import StepGauge
@@ -101,7 +101,7 @@ def periodic_part(position: Floats, deviation: Floats) -> Periodic | None:
     left = max(total - float(explained[best]), 0.0)
     if total == 0 or freedom < 1:
         return None
-    chance = float(special.fdtrc(2, freedom, explained[best] / 2 / (left / freedom))) if left > 0 else 0.0
+    chance = float(scipy.special.fdtrc(2, freedom, explained[best] / 2 / (left / freedom))) if left > 0 else 0.0
     width = float(np.ptp(frequencies)) * np.sqrt(4 * np.pi * np.var(position))
     p_value = float(min(1.0, chance * (1 + width * np.sqrt(-np.log(max(chance, 1e-300))))))
     if p_value >= SIGNIFICANT:

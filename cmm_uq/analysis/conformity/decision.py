@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from math import hypot, isfinite, sqrt
+from math import erfc, hypot, isfinite, sqrt
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,11 @@ from cmm_uq.maths.inference.slow import root
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _REACH = 9.0  # Standard deviations beyond which a normal distribution is nothing: 1e-19
+
+
+def phi(z: float) -> float:
+    """The normal distribution function."""
+    return 0.5 * erfc(-z / sqrt(2.0))
 
 
 @dataclass(frozen=True)
@@ -44,18 +50,18 @@ class PriorKnowledge:
         return min(u, self.sd * sqrt(max(limit - value, 1e-12 * abs(limit)) / turn)) if turn > 0 else u
 
     def within(self, limit: float, *, signed: bool) -> float:
-        high = float(scipy.special.ndtr((limit - self.mean) / self.sd))
+        high = phi((limit - self.mean) / self.sd)
         if signed:
-            return max(0.0, high - float(scipy.special.ndtr((-limit - self.mean) / self.sd)))
-        below = float(scipy.special.ndtr(-self.mean / self.sd))
+            return max(0.0, high - phi((-limit - self.mean) / self.sd))
+        below = phi(-self.mean / self.sd)
         return max(0.0, high - below) / (1.0 - below) if below < 1.0 else 1.0
 
     def beyond(self, limit: float, *, signed: bool) -> float:
         """The rest, which keeps its digits where it is small."""
-        high = float(scipy.special.ndtr((self.mean - limit) / self.sd))
+        high = phi((self.mean - limit) / self.sd)
         if signed:
-            return high + float(scipy.special.ndtr((-limit - self.mean) / self.sd))
-        above = float(scipy.special.ndtr(self.mean / self.sd))
+            return high + phi((-limit - self.mean) / self.sd)
+        above = phi(self.mean / self.sd)
         return high / above if above > 0.0 else 0.0
 
 
@@ -70,7 +76,7 @@ def global_risks(acceptance: float, limit: float, u: float, prior: PriorKnowledg
     """Of accepting values up to ``acceptance``, negative where none is accepted (JCGM 106:2012, 9.5.3 and 9.5.4)."""
     low = max(prior.mean - _REACH * prior.sd, -np.inf if signed else 0.0)
     high = max(prior.mean, 0.0) + _REACH * prior.sd
-    total = 1.0 if signed else float(scipy.special.ndtr(prior.mean / prior.sd))
+    total = 1.0 if signed else phi(prior.mean / prior.sd)
     bends = [-limit, limit, *(at + k * u for at in (-acceptance, acceptance) for k in range(-8, 9)),
              *(prior.mean + k * prior.sd for k in range(-9, 10))]  # fmt: skip
     edges = np.array(sorted({low, high, *np.clip(bends, low, high).tolist()}))
@@ -156,9 +162,9 @@ def decide(
         return Decision("fail", None, None, 0.0, rule_words(rule))
     if u <= 0:
         return Decision("pass" if size <= limit else "fail", None, None, 0.0, rule_words(rule))
-    beyond, within = _beyond(size, u, limit, signed), float(scipy.special.ndtr((limit - size) / u))
+    beyond, within = _beyond(size, u, limit, signed), phi((limit - size) / u)
     if signed:
-        within = max(0.0, 1.0 - beyond) if size <= limit else within - float(scipy.special.ndtr((-limit - size) / u))
+        within = max(0.0, 1.0 - beyond) if size <= limit else within - phi((-limit - size) / u)
     if prior is None:
         outcome, band = _decided(size, u, limit, rule, signed, beyond, unstated)
     else:
@@ -177,7 +183,7 @@ def _decided(
     if (risk := largest_risk(rule)) is not None:
         # Beyond the nearer limit by the guard band: to lie anywhere else than between two limits is no proof, for u large.
         doubt = hypot(u, unstated) if isinstance(rule, str) else u
-        within = float(scipy.special.ndtr((limit - size) / doubt))
+        within = phi((limit - size) / doubt)
         return _by_probability(size, limit, within, beyond, risk), _guard_band(u, limit, risk, signed)
     width = guard_width(rule) * COVERAGE_FACTOR * u
     band = width if width <= limit else None
@@ -253,8 +259,8 @@ def rule_name(rule: Rule) -> str:
 
 
 def _beyond(size: float, u: float, limit: float, signed: bool) -> float:
-    nearer = float(scipy.special.ndtr((size - limit) / u))
-    return nearer + float(scipy.special.ndtr((-limit - size) / u)) if signed else nearer
+    nearer = phi((size - limit) / u)
+    return nearer + phi((-limit - size) / u) if signed else nearer
 
 
 def _by_band(size: float, limit: float, band: float) -> Outcome:
@@ -278,7 +284,7 @@ def _by_probability(size: float, limit: float, within: float, beyond: float, ris
 
 def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | None:
     """Distance of the largest acceptable value from the limit; ``None`` when no value is acceptable."""
-    one_sided = max(0.0, -float(scipy.special.ndtri(risk))) * u
+    one_sided = max(0.0, -NormalDist().inv_cdf(risk)) * u
     if not signed or _beyond(limit - one_sided, u, limit, signed) <= risk * (1 + 1e-12):
         return one_sided
     if _beyond(0.0, u, limit, signed) > risk:

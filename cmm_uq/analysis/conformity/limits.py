@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.conformity import decision
 from cmm_uq.analysis.conformity.decision import COVERAGE_FACTOR, Outcome, PriorKnowledge, guard_width, rule_name
@@ -115,7 +115,7 @@ class Limits:
         drawn = count / len(self.errors)
         if count >= RARE or np.isnan(deviations):
             return drawn
-        return max(drawn, min(float(special.ndtr(deviations)), RARE / len(self.errors)))
+        return max(drawn, min(float(scipy.special.ndtr(deviations)), RARE / len(self.errors)))
 
     def knowing(self, value: float) -> tuple[float, float]:
         """Probabilities of the true value inside and outside, with what the prior says."""
@@ -129,8 +129,8 @@ class Limits:
         total = float(weight.sum())
         if total**2 < FEWEST * float(np.sum(weight**2)) or not total:
             known = prior.after(value, self.u)
-            least = float(special.ndtr(-known.mean / known.sd)) if self.zone else 0.0
-            low, high = (float(special.ndtr((limit - known.mean) / known.sd)) for limit in (self.low, self.high))
+            least = float(scipy.special.ndtr(-known.mean / known.sd)) if self.zone else 0.0
+            low, high = (float(scipy.special.ndtr((limit - known.mean) / known.sd)) for limit in (self.low, self.high))
             inside = max(0.0, high - max(least, low)) / max(1.0 - least, np.finfo(np.float64).tiny)
             return min(1.0, inside), max(0.0, 1.0 - inside)
         outside = (true > self.high) | (true < self.low)
@@ -160,7 +160,7 @@ class Limits:
                 low = np.searchsorted(self.errors, self.low + guard - true, "left")
                 accepted = high / len(self.errors) - low / len(self.errors)
                 found += float(np.sum(density * np.maximum(0.0, accepted))) * reach / _NODES
-        return found / (float(special.ndtr(prior.mean / prior.sd)) if self.zone else 1.0)
+        return found / (float(scipy.special.ndtr(prior.mean / prior.sd)) if self.zone else 1.0)
 
 
 def judge(limits: Limits, rule: Rule, value: float | None) -> LimitDecision:
@@ -202,7 +202,7 @@ def _safe(limits: Limits, rule: Rule, value: float) -> bool:
     if (least := decision.least_probability(rule)) is not None:
         return limits.doubt(value) <= 1 - least
     if (risk := decision.largest_risk(rule)) is None and (guard := guard_width(rule)):
-        risk = float(special.ndtr(-guard * COVERAGE_FACTOR))
+        risk = float(scipy.special.ndtr(-guard * COVERAGE_FACTOR))
     return risk is None or limits.beyond(value) <= risk
 
 

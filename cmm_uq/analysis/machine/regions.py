@@ -23,7 +23,7 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
 from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws
@@ -331,5 +331,5 @@ def disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floa
     """Coefficients of the named model that draws (N, k) of the same from all errors together deny, jointly."""
     one, k = posterior.draws[:, : recorded.shape[1]], recorded.shape[1]
     off = np.abs(one.mean(axis=0) - recorded.mean(axis=0))
-    limit = ndtri(1 - 0.5 * _DISAGREES / max(k, 1)) * np.hypot(one.std(axis=0), recorded.std(axis=0))
+    limit = scipy.special.ndtri(1 - 0.5 * _DISAGREES / max(k, 1)) * np.hypot(one.std(axis=0), recorded.std(axis=0))
     return tuple(model.unknowns[i].key for i in np.flatnonzero(off > limit))

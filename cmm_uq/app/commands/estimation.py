@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy import special
+import scipy
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
@@ -93,7 +93,7 @@ def with_noise(model: RecordingModel) -> tuple[RecordingModel, Estimate, float |
     if model.sigma is None or result.degrees_of_freedom < 1:
         return model, estimate, None
     squares = float(np.sum((result.residuals / estimate.linear.noise_scale) ** 2))
-    p_value = float(special.chdtrc(result.degrees_of_freedom, squares / model.sigma**2))
+    p_value = float(scipy.special.chdtrc(result.degrees_of_freedom, squares / model.sigma**2))
     if p_value < LACK_OF_FIT:
         model = replace(model, sigma=None)
         estimate = model.estimate()
@@ -221,7 +221,7 @@ def contradictions(
             lines.setdefault(i, []).append((abs(off), own, Contradiction(unknown.key, number, alone)))
     found = []
     for each in lines.values():
-        factor = float(special.ndtri(0.5 + 0.5 * 0.95 ** (1 / len(each))) / special.ndtri(0.975))
+        factor = float(scipy.special.ndtri(0.5 + 0.5 * 0.95 ** (1 / len(each))) / scipy.special.ndtri(0.975))
         off, own, line = max(each, key=lambda one: one[0] / one[1])
         if off > factor * own:
             found.append(line)

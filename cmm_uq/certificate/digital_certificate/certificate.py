@@ -14,7 +14,7 @@ from math import sqrt
 from types import MappingProxyType
 from typing import Any
 
-from scipy import special
+import scipy
 
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -268,7 +268,7 @@ def _together(results: Mapping[str, Any], figures: plain.DigitalFigures) -> dcc.
         ))
         for column, b in zip(chosen, units, strict=True)
     )  # fmt: skip
-    factor = plain.decimal(float(f"{sqrt(special.chdtri(len(chosen), 0.05)):.6f}"))
+    factor = plain.decimal(float(f"{sqrt(scipy.special.chdtri(len(chosen), 0.05)):.6f}"))
     values, U, k = (plain.decimals([quantity[key] for quantity in found]) for key in ("value", "U", "k"))
     stated = dcc.RealList(
         labels=tuple(names[i] for i in chosen), values=values, units=tuple(units),

@@ -18,8 +18,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
@@ -264,7 +264,7 @@ def normal_lattice(count: int, d: int) -> Floats:
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (d + 1))
     points = (0.5 + np.outer(np.arange(1, count + 1), root ** -np.arange(1.0, d + 1))) % 1.0
-    return np.asarray(special.ndtri(points), dtype=np.float64)
+    return np.asarray(scipy.special.ndtri(points), dtype=np.float64)
 
 
 def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float) -> DriftPrior:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -171,7 +171,7 @@ def _usual(
 def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covariance: Floats) -> UsualRate:
     means, variances = mean @ row, np.einsum("i,wij,j->w", row, covariance, row)
     rate, u = float(means.mean()), float(np.sqrt(variances.mean() + means.var()))
-    half = float(special.ndtri(0.975)) * u
+    half = float(scipy.special.ndtri(0.975)) * u
     return UsualRate(kind, name, count, rate, u, rate - half, rate + half)
 
 
@@ -218,7 +218,7 @@ def _rates(state: DriftState, prior: drift.DriftPrior, start: DriftStart) -> Flo
     z = np.abs(at_node - before) / np.sqrt(np.maximum(gained, _LEAST_SHIFT * spread))
     node = weight.sum(axis=2) * _without_it(state, prior)[:, prior.group]
     node /= node.sum(axis=1, keepdims=True)
-    p = (node * 2 * special.ndtr(-z)).sum(axis=1)
+    p = (node * 2 * scipy.special.ndtr(-z)).sum(axis=1)
     expected = (node * before).sum(axis=1)
     u_expected = np.sqrt((node * (spread + (before - expected[:, None]) ** 2)).sum(axis=1))
     return np.stack([mean, np.sqrt(total), expected, u_expected, p])

@@ -24,7 +24,6 @@ from itertools import pairwise
 
 import numpy as np
 import scipy
-from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
@@ -85,7 +84,7 @@ def _rejection(passed: int, tested: int, target: float) -> float:
     if passed == 0:
         return float(1 - (1 - target) ** tested)
     below = passed / tested <= target
-    tail = special.bdtr(passed, tested, target) if below else 1 - special.bdtr(passed - 1, tested, target)
+    tail = scipy.special.bdtr(passed, tested, target) if below else 1 - scipy.special.bdtr(passed - 1, tested, target)
     return max(float(1 - 2 * tail), 0.0)
 
 
@@ -95,8 +94,8 @@ def reliability_range(passed: int, tested: int, confidence: float) -> tuple[floa
         return 0.0, float(1 - (1 - confidence) ** (1 / tested))
     if passed == tested:
         return float((1 - confidence) ** (1 / tested)), 1.0
-    low = special.betaincinv(passed, tested - passed + 1, (1 - confidence) / 2)
-    high = special.betaincinv(passed + 1, tested - passed, (1 + confidence) / 2)
+    low = scipy.special.betaincinv(passed, tested - passed + 1, (1 - confidence) / 2)
+    high = scipy.special.betaincinv(passed + 1, tested - passed, (1 + confidence) / 2)
     return float(low), float(high)
 
 
@@ -222,7 +221,7 @@ def _powers(days: Floats, order: int) -> Floats:
 
 def _t(freedoms: Floats, distance: Floats, u: Floats) -> Floats:
     """Student's distribution function of ``distance/u``; a step where nothing is uncertain."""
-    return np.asarray(np.where(u > 0, special.stdtr(freedoms, distance / np.where(u > 0, u, 1.0)), distance >= 0))
+    return np.asarray(np.where(u > 0, scipy.special.stdtr(freedoms, distance / np.where(u > 0, u, 1.0)), distance >= 0))
 
 
 def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Series:

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -36,7 +35,7 @@ class ReliabilityModel(NamedTuple):
 
 def _within_one(variance: Floats) -> Floats:
     """Probability that a normal deviate of this variance lies within ±1."""
-    return np.asarray(2 * special.ndtr(1 / np.sqrt(variance)) - 1)
+    return np.asarray(2 * scipy.special.ndtr(1 / np.sqrt(variance)) - 1)
 
 
 def _modified_gamma(t: Floats, p: Floats) -> Floats:
@@ -55,9 +54,9 @@ MODELS: Mapping[str, ReliabilityModel] = {model[0]: ReliabilityModel(*model) for
     (say("mortality drift"), lambda t, p: np.exp(-(p[0] * t + p[1] * t**2)), ((0.5, 0.5), (0.1, 1.0))),
     (say("warranty"), lambda t, p: 1 / (1 + np.exp(np.clip(p[0] * (t - p[1]), -_EXPONENT, _EXPONENT))),
      ((4.0, 1.0), (1.0, 0.5))),
-    (say("drift"), lambda t, p: special.ndtr(p[0] + p[2] * t) + special.ndtr(p[1] - p[2] * t) - 1,
+    (say("drift"), lambda t, p: scipy.special.ndtr(p[0] + p[2] * t) + scipy.special.ndtr(p[1] - p[2] * t) - 1,
      ((2.0, 2.0, 2.0), (4.0, 1.0, 1.0))),
-    (say("log-normal"), lambda t, p: special.ndtr(-np.log(p[0] * t) / p[1]), ((1.0, 1.0), (1.0, 3.0))),
+    (say("log-normal"), lambda t, p: scipy.special.ndtr(-np.log(p[0] * t) / p[1]), ((1.0, 1.0), (1.0, 3.0))),
 )}  # fmt: skip
 
 
@@ -167,17 +166,17 @@ def _fitted(
     lack = (data.tested * (observed - model.reliability(data.days / scale, parameters)) ** 2).sum() / (groups - free)
     ratio = lack / error if error > 0 else np.inf
     freedoms = groups - free, count - groups
-    rejection = float(special.fdtr(*freedoms, ratio)) if np.isfinite(ratio) else 1.0
+    rejection = float(scipy.special.fdtr(*freedoms, ratio)) if np.isfinite(ratio) else 1.0
     interval = _time_of(model, parameters, target)
     reach = _time_of(model, parameters, 1 - target) or _FAR
-    accepted = bool(ratio < special.fdtri(*freedoms, LEVEL))
+    accepted = bool(ratio < scipy.special.fdtri(*freedoms, LEVEL))
     days = None if interval is None else interval * scale
     return ReliabilityFit(model.name, parameters, scale, days, rejection, accepted, 0.0), reach * scale
 
 
 def _most_likely(model: ReliabilityModel, data: ReliabilityData, scale: float) -> Floats:
     t, out = data.days / scale, data.tested - data.in_tolerance
-    passed, out_of, tested = (special.xlogy(count, count) for count in (data.in_tolerance, out, data.tested))
+    passed, out_of, tested = (scipy.special.xlogy(count, count) for count in (data.in_tolerance, out, data.tested))
     fullest = passed + out_of - tested
 
     def deviances(parameters: Floats) -> Floats:
@@ -222,7 +221,7 @@ def _range(best: ReliabilityFit, data: ReliabilityData, target: float) -> tuple[
     r = np.clip(model.reliability(t, best.parameters), _SURE, 1 - _SURE)
     slopes = _gradients(model, t, best.parameters)
     covariance = np.linalg.pinv(slopes.T @ ((data.tested / (r * (1 - r)))[:, None] * slopes))
-    factor = float(special.ndtri(0.5 + LEVEL / 2))
+    factor = float(scipy.special.ndtri(0.5 + LEVEL / 2))
     times = np.linspace(1e-6, 1.0, 400)
     gradient = _gradients(model, times, best.parameters)
     half = factor * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", gradient, covariance, gradient), 0))

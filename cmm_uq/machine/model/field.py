@@ -25,7 +25,7 @@ from functools import cache
 from itertools import product
 
 import numpy as np
-from scipy.special import ndtri, sici
+import scipy
 
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Points
@@ -105,7 +105,7 @@ class AxisFunction(Effect):
 
 def bounded(effect: Effect, largest_um: float) -> Effect:
     """Play whose gap, or a periodic error whose amplitude, 95 of 100 do not exceed: normal, or with normal sine and cosine."""
-    quantile = np.sqrt(-2 * np.log(0.05)) if isinstance(effect, PeriodicScale) else ndtri(0.975)
+    quantile = np.sqrt(-2 * np.log(0.05)) if isinstance(effect, PeriodicScale) else scipy.special.ndtri(0.975)
     found = copy(effect)
     found.stated = True
     found.coefficients = tuple(replace(one, prior_sd=float(largest_um / quantile)) for one in effect.coefficients)
@@ -256,7 +256,7 @@ def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
         same, every = distance < _SAME * bands[0][0], np.log(bands[-1][1] / bands[0][0])
         apart = np.where(same, 1.0, distance)
         for low, high, sd in bands:
-            found = sici(apart / low)[1] - sici(apart / high)[1]
+            found = scipy.special.sici(apart / low)[1] - scipy.special.sici(apart / high)[1]
             found[same] = np.log(high / low)
             whole = whole + (MICROMETRE * sd) ** 2 * (found / every)
     return np.asarray(whole)

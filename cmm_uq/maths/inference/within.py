@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import log_ndtr, ndtri_exp
+import scipy
 
 from cmm_uq.base.points import Floats
 
@@ -96,7 +96,7 @@ def _ends(mean: Floats, sd: Floats, limit: Floats | float) -> tuple[Floats, Floa
 def truncated(mean: Floats, sd: Floats, limit: Floats | float) -> tuple[Floats, Floats, Floats]:
     """Logarithm of the probability that normal quantities are within ±limit; their mean and variance if they are."""
     low, high, sign = _ends(mean, sd, limit)
-    log = log_ndtr(high) + np.log(-np.expm1(log_ndtr(low) - log_ndtr(high)))
+    log = scipy.special.log_ndtr(high) + np.log(-np.expm1(scipy.special.log_ndtr(low) - scipy.special.log_ndtr(high)))
     below, above = (np.exp(_LOG_DENSITY - 0.5 * end**2 - log) for end in (low, high))
     shift = below - above
     variance = np.maximum(1 + low * below - high * above - shift**2, 1e-12)
@@ -107,5 +107,7 @@ def truncated_draws(mean: Floats, sd: Floats, limit: float, uniform: Floats) -> 
     """Of these, for numbers uniform between 0 and 1."""
     low, high, sign = _ends(mean, sd, limit)
     with np.errstate(divide="ignore"):
-        log = np.logaddexp(np.log(uniform) + log_ndtr(high), np.log1p(-uniform) + log_ndtr(low))
-    return np.asarray(np.clip(mean + sign * sd * ndtri_exp(log), -limit, limit))
+        log = np.logaddexp(
+            np.log(uniform) + scipy.special.log_ndtr(high), np.log1p(-uniform) + scipy.special.log_ndtr(low)
+        )
+    return np.asarray(np.clip(mean + sign * sd * scipy.special.ndtri_exp(log), -limit, limit))

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from math import gamma, pi
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -172,7 +172,7 @@ class SmallestRegion:
 def elliptical_factor(outputs: int, coverage: float = 0.95) -> float:
     """Factor of the ellipsoid for normal outputs, √χ²: 2.4477 for two and 95 % (JCGM 102 table 1)."""
     check_coverage(coverage)
-    return float(np.sqrt(special.chdtri(outputs, 1 - coverage)))
+    return float(np.sqrt(scipy.special.chdtri(outputs, 1 - coverage)))
 
 
 def elliptical_region(draws: Floats, coverage: float = 0.95) -> Ellipsoid:
