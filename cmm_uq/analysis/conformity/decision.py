@@ -26,7 +26,6 @@ _REACH = 9.0  # Standard deviations beyond which a normal distribution is nothin
 
 
 def phi(z: float) -> float:
-    """The normal distribution function."""
     return 0.5 * erfc(-z / sqrt(2.0))
 
 
@@ -50,18 +49,14 @@ class PriorKnowledge:
         return min(u, self.sd * sqrt(max(limit - value, 1e-12 * abs(limit)) / turn)) if turn > 0 else u
 
     def within(self, limit: float, *, signed: bool) -> float:
-        high = phi((limit - self.mean) / self.sd)
-        if signed:
-            return max(0.0, high - phi((-limit - self.mean) / self.sd))
-        below = phi(-self.mean / self.sd)
-        return max(0.0, high - below) / (1.0 - below) if below < 1.0 else 1.0
+        below, high = (phi((at - self.mean) / self.sd) for at in (-limit if signed else 0.0, limit))
+        return max(0.0, high - below) / (1.0 if signed else 1.0 - below) if signed or below < 1.0 else 1.0
 
     def beyond(self, limit: float, *, signed: bool) -> float:
         """The rest, which keeps its digits where it is small."""
-        high = phi((self.mean - limit) / self.sd)
+        high, above = phi((self.mean - limit) / self.sd), phi(self.mean / self.sd)
         if signed:
             return high + phi((-limit - self.mean) / self.sd)
-        above = phi(self.mean / self.sd)
         return high / above if above > 0.0 else 0.0
 
 
@@ -259,8 +254,7 @@ def rule_name(rule: Rule) -> str:
 
 
 def _beyond(size: float, u: float, limit: float, signed: bool) -> float:
-    nearer = phi((size - limit) / u)
-    return nearer + phi((-limit - size) / u) if signed else nearer
+    return phi((size - limit) / u) + (phi((-limit - size) / u) if signed else 0.0)
 
 
 def _by_band(size: float, limit: float, band: float) -> Outcome:

@@ -26,12 +26,10 @@ from cmm_uq.laboratory.records.facts import Series
 _HORIZON = drift.HORIZON * drift.YEAR
 
 
+# Days after the last certificate up to the horizon: for many machines whose dates are wide, a week, and a sixth more each;
 DAYS = np.concatenate([[0.0], np.geomspace(7.0, _HORIZON, 48)])
-"""Days after the last certificate up to the horizon, for many machines whose dates are wide: a week, and a sixth more each."""
-
+# for one, a fortnight each for three years, then a twentieth more
 FINE = np.concatenate([np.arange(0.0, 1120.0, 14.0), np.geomspace(1120.0, _HORIZON, 54)])
-"""The same for one machine: a fortnight each for three years, then a twentieth more."""
-
 PATHS = 1024
 _AT_ONCE = 2_000_000
 _GAPS = 15_000  # levels of paths that are moved together: they stay in the cache of a core

@@ -134,6 +134,7 @@ def staircase(
 
 
 _FAR, _STEPS = 100.0, 4000  # times, in units of the longest observed interval, within which an interval is sought
+_AT_ONCE = 4  # errors that are followed together: as many as a core's cache holds
 
 
 @dataclass(frozen=True)
@@ -234,9 +235,6 @@ def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Serie
     ])  # fmt: skip
 
 
-AT_ONCE = 4  # errors that are followed together: as many as a core's cache holds
-
-
 def drift_interval(
     certificates: Sequence[RecordedCertificate], reliability: float, priors: Mapping[str, DriftPrior]
 ) -> tuple[float, str, bool]:
@@ -251,26 +249,25 @@ def drift_interval(
     if not limited:
         raise CmmUqError(say("its certificate has no limits"))
     limited.sort(key=lambda each: -abs(each[0].value[-1]) / each[1])  # how soon the first crosses says how far to look
-    together: dict[tuple[float, str], list[tuple[Series, DriftHistory, float]]] = {}
+    together: dict[tuple[float, str, int], list[tuple[Series, DriftHistory, float]]] = {}
     refused: CmmUqError | None = None
-    for one, limit in limited:  # in units of its limit all that no fleet tells of have one prior
+    for i, (one, limit) in enumerate(limited):  # in units of its limit all that no fleet tells of have one prior
         learnt = one.name if one.name in priors else ""
         try:
             own = history(one).in_units(1.0 if learnt else limit)
         except CmmUqError as error:
             refused = error
             continue
-        together.setdefault((own.day[-1], learnt), []).append((one, own, limit if learnt else 1.0))
+        together.setdefault((own.day[-1], learnt, i // _AT_ONCE), []).append((one, own, limit if learnt else 1.0))
     begin, part = last.day.toordinal(), 1 - reliability
     found: list[tuple[float, str, bool]] = []
-    some = ((day, of[i : i + AT_ONCE]) for (day, _), of in together.items() for i in range(0, len(of), AT_ONCE))
-    for day, each in some:
-        prior = priors.get(each[0][0].name) or default_prior(1.0)
-        machines, limits = side_by_side([own for _, own, _ in each]), np.array([limit for *_, limit in each])
+    for (day, learnt, _), each in together.items():
+        machines, prior = side_by_side([own for _, own, _ in each]), priors.get(learnt) or default_prior(1.0)
         until = min(found, default=(HORIZON * YEAR,))[0] + begin - day + 1
+        limits = np.array([limit for *_, limit in each])
         crossed = crossings(machines, prior, filtered(machines, prior), limits, until=until, days=FINE, enough=part)
         days = np.floor(crossed.quantile(part)) + day - begin
-        found += [(float(after), one.quantity, one.name in priors) for after, (one, *_) in zip(days, each, strict=True)]
+        found += [(float(after), one.quantity, bool(learnt)) for after, (one, *_) in zip(days, each, strict=True)]
     if not found:
         raise refused or CmmUqError(say("nothing in its history can be followed"))
     return min(found)

@@ -98,16 +98,14 @@ def truncated(mean: Floats, sd: Floats, limit: Floats | float) -> tuple[Floats, 
     low, high, sign = _ends(mean, sd, limit)
     log = scipy.special.log_ndtr(high) + np.log(-np.expm1(scipy.special.log_ndtr(low) - scipy.special.log_ndtr(high)))
     below, above = (np.exp(_LOG_DENSITY - 0.5 * end**2 - log) for end in (low, high))
-    shift = below - above
-    variance = np.maximum(1 + low * below - high * above - shift**2, 1e-12)
-    return log, np.asarray(mean + sign * sd * shift), np.asarray(sd**2 * variance)
+    variance = np.maximum(1 + low * below - high * above - (below - above) ** 2, 1e-12)
+    return log, np.asarray(mean + sign * sd * (below - above)), np.asarray(sd**2 * variance)
 
 
 def truncated_draws(mean: Floats, sd: Floats, limit: float, uniform: Floats) -> Floats:
     """Of these, for numbers uniform between 0 and 1."""
     low, high, sign = _ends(mean, sd, limit)
     with np.errstate(divide="ignore"):
-        log = np.logaddexp(
-            np.log(uniform) + scipy.special.log_ndtr(high), np.log1p(-uniform) + scipy.special.log_ndtr(low)
-        )
+        below, above = scipy.special.log_ndtr(low), scipy.special.log_ndtr(high)
+        log = np.logaddexp(np.log(uniform) + above, np.log1p(-uniform) + below)
     return np.asarray(np.clip(mean + sign * sd * scipy.special.ndtri_exp(log), -limit, limit))
