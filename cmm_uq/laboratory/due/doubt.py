@@ -77,8 +77,12 @@ def doubtful_periods(certificates: Sequence[RecordedCertificate]) -> tuple[Doubt
 
 
 def parts_measured(machine: RecordedMachine, reports: Iterable[Path]) -> Iterator[MeasuredPart]:
-    """Of files ``results.json`` those of parts that were measured on a machine; what cannot be read is refused."""
-    called = spelled(machine.name if machine.by_name else machine.serial)
+    """Of files ``results.json`` those of parts that were measured on a machine, by its serial number, else by its name.
+
+    A report of a part that cannot be read is refused.
+    """
+    name, maker = spelled(machine.name), spelled(f"({machine.manufacturer})")
+    serial = "" if machine.by_name else spelled(machine.serial).removesuffix(maker)
     for file in reports:
         content = content_of(file, TABLE_BYTES, "Mend it, or name other folders with --parts")
         try:
@@ -86,7 +90,8 @@ def parts_measured(machine: RecordedMachine, reports: Iterable[Path]) -> Iterato
             if not str(data["schema"]).startswith(SCHEMA) or data["job"]["origin"] != "measured":
                 continue
             job, part, by = data["job"], data["part"], data["machine"]
-            if spelled(str((not machine.by_name and by["serial"]) or by["machine"])) == called:
+            own = spelled(str(by["serial"] or "")) if serial else ""
+            if own == serial if own else spelled(str(by["machine"])) == name:
                 when, calibrated = (dt.date.fromisoformat(one["date"]) for one in (job, by))
                 number, outcome = job.get("number") or job["id"], data["decision"]["outcome"]
                 texts = [str(one or "") for one in (number, part["name"], part["serial"], by["number"], outcome)]

@@ -76,10 +76,15 @@ def test_parts_in_doubt_are_those_measured_since_by_no_newer_certificate(tmp_pat
     )
     files.append(part_report(tmp_path, "2024-04-01", job={"id": "s", "origin": "simulated", "date": "2024-04-01"}))
     files.append(part_report(tmp_path, "2024-04-01", schema="cmm-uq/report/1"))
+    files.append(
+        part_report(
+            tmp_path, "2024-04-29", machine={"machine": "iota", "serial": None, "number": "K", "date": "2024-01-01"}
+        )
+    )
     until = dt.date(2024, 8, 1)
     periods = [DoubtfulPeriod(dt.date(2024, 3, 1), check(5, 9.0), until)]
     (found,) = with_parts(periods, MACHINE, files, dt.date(2024, 8, 15))
-    assert [one.day.isoformat() for one in found.parts] == ["2024-03-01", "2024-04-30", "2024-06-02"]
+    assert [one.day.isoformat() for one in found.parts] == ["2024-03-01", "2024-04-29", "2024-04-30", "2024-06-02"]
     (none,) = with_parts([replace(periods[0], after=dt.date(2024, 8, 1))], MACHINE, files, until)
     assert none.parts == ()
     damaged = tmp_path / "results.json"
@@ -114,6 +119,9 @@ def test_history_names_the_parts_between_a_good_and_a_failed_check(tmp_path: Pat
         "2024-03-01 on is in doubt. Nothing since finds it in order. The report of one part that was measured then is known."
     )
     assert "part-2024-04-30" in render_html(history_document(found))
+    with pytest.raises(CmmUqError, match="is no folder"):
+        history_of("1102", tmp_path / "records.db", on=dt.date(2024, 7, 1), parts=[tmp_path / "other"])
+    (tmp_path / "other").mkdir()
     nowhere = history_of("1102", tmp_path / "records.db", on=dt.date(2024, 7, 1), parts=[tmp_path / "other"])
     assert str(doubt_words(nowhere.doubtful[0])).endswith("No report of a part that was measured then is known.")
 

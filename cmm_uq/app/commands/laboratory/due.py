@@ -15,7 +15,7 @@ import numpy as np
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.limits import TABLE_BYTES, content_of
+from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of
 from cmm_uq.laboratory.due.doubt import with_parts
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
@@ -229,6 +229,10 @@ def history_of(
         entries = (one.entry[one.day <= day.toordinal()] for one in series.values())
         stated = outcomes_of(records, {int(until[-1]) for until in entries if len(until)})
         history = machine_history(found, certificates, series, day, _priors(learnt, found), stated)
+    for folder in parts:
+        if not folder.is_dir():
+            raise CmmUqError("is no folder", where=str(folder), fix="Name a folder with reports of parts")
+        check_permitted(folder, "Mend its permissions, or name another folder")
     below = [(home, f"{deep}results.json") for deep in ("*/", "*/*/") if home is not None]
     places = [(folder, "**/results.json") for folder in parts] or below
     reports = sorted({file for folder, names in places for file in folder.glob(names)})
