@@ -216,15 +216,15 @@ def _of_form(term: FunctionTerm, form: ClosedForm, seen: Seen, covariate: Floats
 def _families(
     term: FunctionTerm, seen: Seen, covariate: Floats, *, forms: bool = True, weight: float = 1.0
 ) -> Iterator[FunctionFamily]:
-    """Of one covariate (p,), each form as probable as a smooth one; ``seen`` gives the columns (m, q) of functions (p, q)."""
-    every = list(forms_of(covariate, time=term.of == "time_s")) if forms else []
+    """Of one covariate (p,); ``seen`` gives the columns (m, q) of functions (p, q)."""
+    log = float(np.log(weight)) - (float(np.log(3)) if forms else 0.0)
     curves = {SMOOTH: list(smooth_functions(covariate)), ROUGH: list(_rough_functions(covariate)) if forms else []}
-    log = float(np.log(weight / (1 + forms + len(every))))
     for form, of_form in curves.items():
         for f in of_form:
             yield FunctionFamily(term, form, seen(f)[:, None], log - float(np.log(len(of_form))), covariate, f[:, None])
+    every = list(forms_of(covariate, time=term.of == "time_s")) if forms else []
     for closed in every:
-        yield _of_form(term, closed, seen, covariate, log - float(np.log(len(closed.shapes))))
+        yield _of_form(term, closed, seen, covariate, log - float(np.log(len(every) * len(closed.shapes))))
 
 
 def _rough_functions(covariate: Floats) -> Iterator[Floats]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, ClosedForm, FunctionTerm, _families, forms_of
-from cmm_uq.base.messages import Verbatim
+from cmm_uq.analysis.diagnosis.empirical.functions import ClosedForm, forms_of
 
 RANDOM = np.random.default_rng(20261129)
 COVARIATE = np.sort(RANDOM.uniform(-40.0, 860.0, 60))
@@ -67,14 +65,3 @@ def test_however_few_values_a_covariate_has_its_forms_are_there(count: int) -> N
     """With nine values a saw had one period, which is next to no other."""
     for form in forms_of(np.arange(float(count))):
         assert len(form.shapes) >= 1
-
-
-def test_a_form_is_as_probable_beforehand_as_a_smooth_function() -> None:
-    """And all functions of one covariate together have the weight of its term."""
-    term, among = FunctionTerm("x_mm", Verbatim("x"), "x"), Counter[str]()
-    for family in _families(term, lambda f: f, COVARIATE, weight=0.5):
-        among[family.form] += family.columns.shape[1] * float(np.exp(family.log_prior))
-    of_name = Counter(form.name for form in forms_of(COVARIATE))
-    assert sum(among.values()) == pytest.approx(0.5)
-    assert among[SMOOTH] == pytest.approx(among[ROUGH]) == pytest.approx(among["cubic"])
-    assert all(among[name] == pytest.approx(count * among[SMOOTH]) for name, count in of_name.items())
