@@ -25,8 +25,8 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 140, "base": 3_344, "maths": 11_044, "jobs": 17_683, "machine": 7_686, "analysis": 20_831, "laboratory": 14_443,
-    "certificate": 16_499, "artefacts": 13_021, "app": 18_251,
+    "": 140, "base": 3_344, "maths": 11_049, "jobs": 17_694, "machine": 7_687, "analysis": 20_906, "laboratory": 14_443,
+    "certificate": 16_499, "artefacts": 13_145, "app": 18_264,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1458

@@ -392,7 +392,7 @@ TABLE_SPHERES = Kind(
         conformity={"standard": "ISO 10360-3:2000", "characteristic": "FR", "limit_um": 5.0, "rule": "ISO 14253-1"},
         test=circumstances(u_repeat_um=0.1), columns={"c_deg": ""}, further={"c_approach": ""}, plan={"repeats": 1},
         recorded=AT_20_C,
-    ), tested=("FR", "FT", "FA"),
+    ), begin_also={"five_axes": f"{_TABLE}:FIVE_AXES"}, tested=("FR", "FT", "FA"),
 )  # fmt: skip
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,

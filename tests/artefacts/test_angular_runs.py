@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import re
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import cmm_uq
+from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.app.commands.diagnose import screened_model
+from cmm_uq.app.commands.estimation import decision
+from cmm_uq.app.commands.jobs.controller import write_tables
+from cmm_uq.app.commands.jobs.new import write_new
+from cmm_uq.app.commands.planning import make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
@@ -154,3 +163,258 @@ def test_a_fault_that_the_model_leaves_out_is_found(tmp_path: Path) -> None:
     edit(folder, r"^effects = .*", 'effects = ["rotary_positioning_c_1", "rotary_positioning_c_2"]')
     told = cmm_uq.diagnose(folder, seed=1).diagnosis
     assert "rotary_play_c" in {each["effect"] for each in told["effects"]}
+
+
+CONFORMITY = """
+[test_uncertainty]
+u_repeat_arcsec = 0.05
+[test_uncertainty.negligible]
+alignment = {{ by = "the laboratory", reason = "the polygon is centred to 10 µm" }}
+[rated_conditions]
+declared = {{ by = "the laboratory", reason = "20 °C" }}
+[[conformity]]
+standard = "{standard}"
+characteristic = "{figure}"
+{limit}
+"""
+
+
+def decided(
+    folder: Path, figure: str = "A", limit: str = "limit_arcsec = 14.0", *, repeats: int = 5, standard: str = "ISO 230-2:2014",
+    polygon: str = "u_polygon_arcsec = 0.1", travel: str = "travel_deg = [0, 360]", extra: str = "",
+) -> tuple[Path, Floats]:  # fmt: skip
+    """A job of a table whose figure is decided, and deviations of the table as read."""
+    certified = np.round(np.linspace(-0.5, 0.5, FACES), 4)
+    made, faces, first = job(folder, [0], polygon, certified=certified, repeats=repeats)
+    # the readings have the true faces, the certificate those of this polygon
+    lines = (made / "recording.csv").read_text(encoding="utf-8").splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    for row in rows:
+        face = int(row[12]) - 1
+        row[9] = f"{float(row[9]) - faces[face] + certified[face] - certified[0]:.6f}"
+    (made / "recording.csv").write_text(
+        "\n".join([lines[0], *(",".join(row) for row in rows)]) + "\n", encoding="utf-8"
+    )
+    toml = (
+        (made / "job.toml")
+        .read_text(encoding="utf-8")
+        .replace(
+            "axis_mm = [250, 250, -300]",
+            f"axis_mm = [250, 250, -300], {travel}" if travel else "axis_mm = [250, 250, -300]",
+        )
+    )
+    toml += CONFORMITY.format(standard=standard, figure=figure, limit=limit) + extra
+    (made / "job.toml").write_text(toml, encoding="utf-8")
+    return made, first
+
+
+def statement(folder: Path) -> Statement:
+    read = read_job(folder)
+    return decision(read, *screened_model(read), 1)
+
+
+def by_hand(x: Floats) -> dict[str, float]:
+    """Figures of deviations (2, targets, repeats), ″, by the printed formulas, term by term."""
+    n, up, down = x.shape[2], x[0], x[1]
+    mean_up, mean_down = (sum(each[:, j] for j in range(n)) / n for each in (up, down))
+    s_up, s_down = (
+        np.sqrt(sum((each[:, j] - mean) ** 2 for j in range(n)) / (n - 1))
+        for each, mean in ((up, mean_up), (down, mean_down))
+    )
+    b, middle = mean_up - mean_down, 0.5 * (mean_up + mean_down)
+    r = [max(2 * a + 2 * c + abs(e), 4 * a, 4 * c) for a, c, e in zip(s_up, s_down, b, strict=True)]
+    top = max((mean_up + 2 * s_up).max(), (mean_down + 2 * s_down).max())
+    bottom = min((mean_up - 2 * s_up).min(), (mean_down - 2 * s_down).min())
+    return {
+        "A": top - bottom, "R": max(r), "B": np.abs(b).max(), "M": np.ptp(middle),
+        "E": max(mean_up.max(), mean_down.max()) - min(mean_up.min(), mean_down.min()),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("figure", ["A", "E", "R", "B", "M"])
+def test_a_figure_of_a_table_is_decided_against_its_limit_in_arcseconds(tmp_path: Path, figure: str) -> None:
+    folder, first = decided(tmp_path / "job", figure)
+    told = statement(folder)
+    value = by_hand(first)[figure]
+    assert told.value_um == pytest.approx(value, abs=2e-6)  # as an arc where 1 µm is 1″
+    assert told.limit_um == pytest.approx(14.0)
+    assert told.outcome == "pass", told.missing
+    u = told.u_um
+    strict, _ = decided(tmp_path / "strict", figure, f"limit_arcsec = {value - 3 * u:.6f}")
+    assert statement(strict).outcome == "fail"
+
+
+@pytest.mark.parametrize(
+    ("repeats", "travel", "extra", "missing"),
+    [
+        (4, "travel_deg = [0, 360]", "", "4 runs, 12 targets"),
+        (5, "travel_deg = [0, 720]", "", None),  # of a table that turns on and on one turn is what is decided
+        (5, "", "", "the travel of C"),
+    ],
+)
+def test_a_test_of_a_table_that_lacks_something_is_incomplete(
+    tmp_path: Path, repeats: int, travel: str, extra: str, missing: str | None
+) -> None:
+    folder, _ = decided(tmp_path / "job", repeats=repeats, travel=travel, extra=extra)
+    told = statement(folder)
+    assert told.outcome == ("incomplete" if missing else "pass")
+    assert missing is None or any(missing in str(one) for one in told.missing)
+
+
+def cut(folder: Path, most: float) -> None:
+    """Of a job the targets up to an angle."""
+    head, *rows = (folder / "recording.csv").read_text(encoding="utf-8").splitlines()
+    kept = [row for row in rows if float(row.split(",")[10]) <= most]
+    (folder / "recording.csv").write_text("\n".join([head, *kept]) + "\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("most", "travel", "missing"),
+    [(60.0, "[0, 90]", ""), (30.0, "[0, 45]", "2 targets"), (120.0, "[0, 180]", ""), (90.0, "[0, 130]", ""),
+     (180.0, "[0, 360]", "two thirds of the travel of C"), (180.0, "[0, 200]", "")],
+)  # fmt: skip
+def test_how_many_targets_a_run_needs_goes_by_how_far_it_turns(
+    tmp_path: Path, most: float, travel: str, missing: str
+) -> None:
+    """Three up to 90°, five up to 180°, eight beyond; over two thirds of the travel."""
+    folder, _ = decided(tmp_path / "job", travel=f"travel_deg = {travel}")
+    cut(folder, most)
+    told = statement(folder)
+    assert told.outcome == ("incomplete" if missing else "pass"), told.missing
+    assert not missing or any(missing in str(one) for one in told.missing)
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"limit": "limit_um = 9.0"}, "is of a rotary axis, and its limit is not"),
+        ({"limit": 'mpe = "3 + L/300"'}, "is of a rotary axis, and its limit is not"),
+        ({"standard": "ISO 230-6:2002", "figure": "Ed"}, "Ed of ISO 230-6:2002 is no angle"),
+    ],
+)
+def test_a_limit_that_does_not_go_with_a_table_is_refused(tmp_path: Path, change: dict[str, str], problem: str) -> None:
+    folder, _ = decided(tmp_path / "job", **change)
+    with pytest.raises(CmmUqError, match=problem):
+        statement(folder)
+
+
+def test_a_figure_of_a_straight_axis_has_no_limit_in_arcseconds(tmp_path: Path) -> None:
+    from tests.conftest import ROOT
+
+    shutil.copytree(ROOT / "examples" / "axis-runs-simulated", tmp_path / "job")
+    toml = tmp_path / "job" / "job.toml"
+    text = toml.read_text(encoding="utf-8")
+    assert "limit_um" in text
+    toml.write_text(re.sub(r"limit_um = [\d.]+", "limit_arcsec = 5.0", text, count=1), encoding="utf-8")
+    with pytest.raises(CmmUqError, match="is of no angle, and its limit is not"):
+        statement(tmp_path / "job")
+
+
+def test_without_what_is_uncertain_of_repeats_or_alignment_no_table_passes(tmp_path: Path) -> None:
+    folder, _ = decided(tmp_path / "job")
+    toml = folder / "job.toml"
+    text = toml.read_text(encoding="utf-8").replace("u_repeat_arcsec = 0.05", "u_repeat_um = 0.05")
+    toml.write_text(text[: text.index("alignment = ")] + text[text.index("[rated_conditions]") :], encoding="utf-8")
+    told = statement(folder)
+    assert told.outcome == "incomplete"
+    said = " ".join(map(str, told.missing))
+    assert "alignment of the artefact is neither stated" in said
+    assert "changes between the readings is neither stated" in said
+    assert "temperature" not in said
+
+
+def test_the_laboratorys_own_rule_decides_a_table_too(tmp_path: Path) -> None:
+    extra = "complete = { measurements = 1, repeats = 5, points = 24 }\n"
+    folder, first = decided(tmp_path / "job", "R", standard="laboratory's own rule", extra=extra)
+    told = statement(folder)
+    assert told.value_um == pytest.approx(by_hand(first)["R"], abs=2e-6)
+    assert told.outcome == "pass", told.missing
+
+
+@pytest.mark.parametrize("form", ["linuxcnc", "sinumerik", "twincat", "template"])
+def test_a_table_for_a_controller_has_degrees(tmp_path: Path, form: str) -> None:
+    """Read back: at each target what the table is turned further than it reads, from both sides, less that at 0."""
+    folder, first = decided(tmp_path / "job")
+    (tmp_path / "c.csv").write_text(
+        "{% for a in axes %}{{ a.name }} {{ a.targets_deg }} {{ a.reverse_correction_arcsec }}{% endfor %}"
+    )
+    files, said = write_tables(folder, tmp_path / "out", str(tmp_path / "c.csv") if form == "template" else form)
+    up, down = first.mean(axis=2) - first.mean(axis=2)[:, 0].mean()
+    at = 30.0 * np.arange(FACES)
+    if form == "linuxcnc":
+        rows = np.loadtxt(files["c.comp"])
+        np.testing.assert_allclose(rows, np.column_stack([at, at + up / 3600, at + down / 3600]), atol=1.1e-6)
+    elif form == "sinumerik":
+        text = files["AX_EEC.INI"].read_text()
+        values = [float(v) for v in re.findall(r"\$AA_ENC_COMP\[0,\d+,C1\]=(\S+)", text)]
+        np.testing.assert_allclose(values, 0.5 * (up + down) / 3600, atol=1.1e-6)
+    elif form == "twincat":
+        text = files["achskw_c.lis"].read_text()
+        found = [
+            [int(v) for v in re.findall(rf"table\[\d+\]\.{name} (\S+)", text)] for name in ("setpoint", "pos", "neg")
+        ]
+        np.testing.assert_allclose(found, np.array([1e4 * at, 1e4 * up / 3600, 1e4 * down / 3600]), atol=0.6)
+    else:
+        text = files["axes.csv"].read_text()
+        assert text.startswith("c [0.0, 30.0")
+        np.testing.assert_allclose([float(v) for v in text.split("[")[2].strip("]\n ").split(",")], -down, atol=1e-5)
+    assert "″ rms" in said[0]
+    told = json.loads((tmp_path / "out" / "controller.json").read_text(encoding="utf-8"))["held_out_rms_arcsec"]["c"]
+    assert told["corrected"] < 0.1 * told["uncorrected"] < told["sign_reversed"]
+
+
+def begun(folder: Path, name: str, plan: str) -> Path:
+    """A new job, with wishes for a plan."""
+    write_new(name, folder, {})
+    toml = folder / "job.toml"
+    toml.write_text(toml.read_text(encoding="utf-8") + f"\n[plan]\n{plan}\n", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.long
+def test_a_plan_of_a_polygon_says_u_and_finds_angles_that_tell_more(tmp_path: Path) -> None:
+    """A second setting between the angles of the first; u of the first order is that of least squares of both."""
+    folder = begun(tmp_path / "job", "polygon", 'ready = "polygon"\nrepeats = 5\ncriterion = "D"\nmore = 1')
+    found = make_plan(read_job(folder))
+    assert found.better is not None
+    (added,) = found.to_measure
+    at = np.unique(added.points.columns["c_deg"])
+    assert set(np.round(at % 30, 3)) <= {7.5, 15.0, 22.5}
+    assert np.ptp(added.points.columns["face"]) == 11
+    before, after = (
+        np.array([row.u for row in one.identifiability.parameters][:2]) for one in (found.start, found.better)
+    )
+    assert np.all(after < 0.8 * before)
+    assert all(not condition.missing for condition in found.conditions)
+
+
+def test_ready_settings_of_a_polygon_without_certified_faces_part_them_from_the_table(tmp_path: Path) -> None:
+    folder = begun(tmp_path / "job", "polygon", 'ready = "polygon"\nrepeats = 1')
+    (folder / "recording.csv").unlink()
+    toml = folder / "job.toml"
+    text = toml.read_text(encoding="utf-8").replace('origin = "simulated"', "")
+    toml.write_text(re.sub(r"(?m)^u_polygon_arcsec.*\n", "", text), encoding="utf-8")
+    found = make_plan(read_job(folder, recorded=False), power=False)
+    shifts = [one.points.columns["face"][0] for one in found.start.placings]
+    assert shifts == [1.0, 2.0]
+    assert found.start.identifiability.complete
+    assert "face_arcsec" not in found.start.points.columns
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (("XYZ|C", "XYZ"), "a polygon stands on a rotary table, which the chain has not"),
+        (("[0.0, 360.0]", "[0.0, 20.0]"), "shows fewer than two faces of a polygon of 12"),
+    ],
+)
+def test_a_polygon_that_no_table_turns_is_not_planned(tmp_path: Path, change: tuple[str, str], problem: str) -> None:
+    folder = begun(tmp_path / "job", "polygon", 'ready = "polygon"')
+    (folder / "recording.csv").unlink()
+    toml = folder / "job.toml"
+    text = toml.read_text(encoding="utf-8").replace('origin = "simulated"', "").replace(*change)
+    if change[1] == "XYZ":
+        text = re.sub(r"(?m)^table = .*\n", "", text)
+    toml.write_text(text, encoding="utf-8")
+    with pytest.raises(CmmUqError, match=problem):
+        make_plan(read_job(folder, recorded=False), power=False)

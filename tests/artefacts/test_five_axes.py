@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 
 import cmm_uq
 from benchmarks.artefacts.five_axes_coverage import NAMED, drawn, names_of, positions, recorded
+from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.app.commands.plan import write_plan
+from cmm_uq.app.commands.planning import make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
@@ -134,3 +136,19 @@ def test_a_sphere_that_strays_says_which_keys_may_be_wrong(tmp_path: Path) -> No
 
 def test_positions_are_those_of_five_runs() -> None:
     assert len(positions("XYZ|AC")) == 5 * 26
+
+
+def test_a_better_plan_of_five_axes_has_other_axes_at_further_angles(tmp_path: Path) -> None:
+    """Of spheres that stay where they are, runs alone are changed; together they tell more than five usual ones."""
+    write_new("five_axes", tmp_path / "job", {})
+    toml = tmp_path / "job" / "job.toml"
+    plan = '\n[plan]\nready = "runs"\nrepeats = 1\ncriterion = "D"\nmore = 1\n'
+    toml.write_text(toml.read_text(encoding="utf-8") + plan, encoding="utf-8")
+    found = make_plan(read_job(tmp_path / "job"), power=False)
+    assert found.better is not None
+    (added,) = found.to_measure
+    first, last = (points.xyz[points.point == 1][0] for points in (found.start.points, added.points))
+    np.testing.assert_allclose(first, last, atol=0.01)
+    before, after = (np.array([row.u for row in one.identifiability.parameters]) for one in (found.start, found.better))
+    assert np.all(after < before)
+    assert np.prod(after / before) < 0.5

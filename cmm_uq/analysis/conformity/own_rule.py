@@ -28,9 +28,9 @@ from cmm_uq.analysis.conformity.uncertainty import (
     temperatures,
     u_of_repeats,
 )
-from cmm_uq.base.messages import Text, Verbatim, number, say, signed
+from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Points
-from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Indications
@@ -126,15 +126,7 @@ def figure_decided(
         budget = length_budget(float(found.lengths[i]), float(found.u[i]), degrees, test.circumstances)
     remarks = [_SAID[lines] if worst.u_um > 0 else NOT_STATED]
     if test.facts.limit_arcsec is not None and worst.length_mm:
-        arc = worst.length_mm * ARCSECOND / MICROMETRE  # µm of one arcsecond
-        remarks.append(
-            say(
-                "As an angle this is {value} ″ with U = {U} ″ (k = 2), against {limit} ″.",
-                value=signed(worst.error_um / arc, ".3g"),
-                U=number(2 * worst.u_um / arc, ".2g"),
-                limit=number(test.facts.limit_arcsec, "g"),
-            )
-        )
+        remarks.append(positioning.as_angle(worst, test.facts.limit_arcsec))
     return test.stated(quantity, measured, items, remarks, signed=of_two_sides,
                        causes=causes if len(items) > 1 else None, budget=budget)  # fmt: skip
 

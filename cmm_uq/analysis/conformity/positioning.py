@@ -14,10 +14,18 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Characteristic, Test
-from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Statement, least_favourable
-from cmm_uq.base.messages import Message, Text, Verbatim, at_key, commas, say
-from cmm_uq.base.points import AXES
-from cmm_uq.base.units import METRE, MICROMETRE
+from cmm_uq.analysis.conformity.statement import (
+    CHOSEN,
+    ITS_RULE,
+    REPORTED,
+    Clause,
+    Decided,
+    Statement,
+    least_favourable,
+)
+from cmm_uq.base.messages import Message, Text, Verbatim, at_key, commas, number as figure_of, say, signed
+from cmm_uq.base.points import AXES, Machine
+from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model.artefact import Artefact
@@ -30,6 +38,9 @@ _DRAWS = 2000
 # largest of many single readings goes by their tails, of which it says nothing; these are the tails that a diagnosis looks for
 _DOF = 4
 REPEATS, LEAST_TARGETS, PER_METRE = 5, 5, 5.0  # runs in each direction, targets (ISO 230-2:2014, of axes up to 2 m)
+# ° of the run of a rotary axis up to which so many targets are enough, as commonly reported of the same standard; its figures
+# are decided as arcs at a radius where 1 µm is 1″
+_TURN, _ANGULAR_TARGETS, _ARC_MM = 360.0, ((90.0, 3), (180.0, 5), (np.inf, 8)), MICROMETRE / ARCSECOND
 DIAGONALS, _MOVES, _MOST = 4, 0.1, 2 / 3  # least cosine with each axis, and part of its travel that each crosses
 _UNEVEN = 2.0  # times the spacing of as few even targets as are asked for, that two of them lie apart at most
 _APART = 5.0  # degrees between targets of a circle, at most: a path that is recorded as it goes has no targets
@@ -48,6 +59,8 @@ def uncertainty_of_figures(runs: PositioningRuns, under: Circumstances) -> dict[
     stated, growth = under.uncertainty, np.zeros(len(runs.targets)) if runs.growth is None else runs.growth
     warm = abs(under.cte_per_k or 0.0) * stated.u_temperature_k * runs.length_mm / MICROMETRE
     alignment, repeat = (stated.u_alignment_um, stated.u_repeat_um) if runs.length_mm else (0.0, 0.0)
+    if runs.angular:
+        alignment, repeat = stated.u_alignment_arcsec, stated.u_repeat_arcsec
     whole = float(np.linalg.norm([runs.u_reference, warm, alignment]))
     motion = runs.motion
     if whole == 0 and repeat == 0 and not (motion and motion.u_delay):
@@ -105,6 +118,10 @@ def positioning(
             fix = "Record more readings, or name fewer targets in [artefact.on_the_fly]"
         raise test.error(f"{error}: {test.facts.standard} needs every target", fix=fix) from None
     test.refuse_nothing_measured(bool(runs), f"{what} in both directions")
+    angular = any(run.angular for run in runs.values())
+    if angular != (test.facts.limit_arcsec is not None):
+        kind, keys = ("a rotary axis", "limit_arcsec") if angular else ("no angle", "limit_um or mpe")
+        raise test.error(f"{figure} of these runs is of {kind}, and its limit is not", "limit_arcsec", f"Give {keys}")
     moving = {number: run.motion for number, run in runs.items() if run.motion is not None}
     if moving and not own:
         problem = f"{test.facts.standard} asks for an axis at rest at each target, and measurement {min(moving)} was in motion"
@@ -124,10 +141,11 @@ def positioning(
             fix = "Record them, or leave the statement out"
             raise test.error(f"measurement {measurement} has no {figure}, which needs {needs}", "characteristic", fix)
         value, u = max(abs(figures[name]) for name in names), max(spread.get(name, 0.0) for name in names)
-        u = test.at_least(u, run.length_mm)
-        test.refuse_without_uncertainty(u, key or "u_repeat_um")
-        limit = test.limit_um(run.length_mm)
-        items.append(test.decided(value, u, limit, signed=False, measurement=measurement, length_mm=run.length_mm))
+        length = _ARC_MM if run.angular else run.length_mm
+        u = test.at_least(u, length)
+        test.refuse_without_uncertainty(u, "u_polygon_arcsec" if run.angular else key or "u_repeat_um")
+        limit = test.limit_um(length)
+        items.append(test.decided(value, u, limit, signed=False, measurement=measurement, length_mm=length))
     worst = least_favourable(tuple(items))
     how = NOT_STATED
     if worst.u_um > 0:
@@ -137,8 +155,18 @@ def positioning(
             u=worst.u_um,
         )
     remarks: list[Text] = [how, _CIRCULAR if of is circles else _FORMULAS, *([_IN_MOTION] if moving else [])]
-    remarks += _not_measured(runs) if of is axes else []
-    items_of = say("circles") if of is circles else say("diagonals") if of is diagonals else say("axes")
+    remarks += [as_angle(worst, test.facts.limit_arcsec)] if test.facts.limit_arcsec is not None else []
+    machine = test.artefact.points.machine
+    remarks += _not_measured(runs, machine, angular=angular) if of is axes else []
+    items_of = (
+        say("rotary axes")
+        if angular
+        else say("circles")
+        if of is circles
+        else say("diagonals")
+        if of is diagonals
+        else say("axes")
+    )
     return test.stated(_TITLES[figure], items_of, tuple(items), remarks, signed=False)
 
 
@@ -148,8 +176,33 @@ def _crosses(run: PositioningRuns, artefact: Artefact) -> bool:
     return bool(np.all(run.length_mm * np.abs(run.travel) >= _MOST * travel))
 
 
+def as_angle(value: Decided, limit_arcsec: float) -> Message:
+    """What was decided as an arc over a length, as the angle that it is."""
+    arc = (value.length_mm or _ARC_MM) * ARCSECOND / MICROMETRE  # µm of one arcsecond
+    return say(
+        "As an angle this is {value} ″ with U = {U} ″ (k = 2), against {limit} ″.", value=signed(value.error_um / arc, ".3g"),
+        U=figure_of(2 * value.u_um / arc, ".2g"), limit=figure_of(limit_arcsec, "g"),
+    )  # fmt: skip
+
+
+def _short_of_turn(runs: Runs, artefact: Artefact) -> Iterator[Message]:
+    """The same of rotary axes, of which runs over more than one turn are not decided."""
+    for run in runs.values():
+        limits, key, _ = artefact.points.machine.limits_of(run.axis)
+        turn, whole = float(np.ptp(run.targets)), min(float(np.ptp(limits)), _TURN)
+        axis = Verbatim(run.axis.upper())
+        if np.isnan(whole):
+            yield say("the travel of {axis}{key}, of which its run is a part", axis=axis, key=at_key(key))
+        elif not _MOST * whole <= turn <= _TURN:
+            yield say("two thirds of the travel of {axis}, within one turn ({turn:.0f} of {whole:.0f}°)", axis=axis,
+                      turn=turn, whole=whole)  # fmt: skip
+
+
 def _short_of_travel(runs: Runs, artefact: Artefact) -> Iterator[Message]:
     """Of each axis that no run goes over most of, in how far its figures are those of a part of it."""
+    if artefact.angular:
+        yield from _short_of_turn(runs, artefact)
+        return
     travel = dict(zip(AXES, np.ptp(artefact.points.machine.travel_mm, axis=1).tolist(), strict=True))
     longest = {axis: max(run.length_mm for run in runs.values() if run.axis == axis) for axis in _named(runs)}
     for axis, length in longest.items():
@@ -162,13 +215,13 @@ def _short_of_travel(runs: Runs, artefact: Artefact) -> Iterator[Message]:
 
 
 def _named(runs: Runs) -> list[str]:
-    return [axis for axis in AXES if any(run.axis == axis for run in runs.values())]
+    return [axis for axis in (*AXES, "a", "b", "c") if any(run.axis == axis for run in runs.values())]
 
 
-def _not_measured(runs: Runs) -> list[Text]:
+def _not_measured(runs: Runs, machine: Machine, *, angular: bool) -> list[Text]:
     """What a reader must know of axes that no run is of."""
     measured = _named(runs)
-    others = [Verbatim(axis.upper()) for axis in AXES if axis not in measured]
+    others = [Verbatim(axis.upper()) for axis in machine.axes if (axis in AXES) != angular and axis not in measured]
     if not measured or not others:
         return []
     those = commas([Verbatim(axis.upper()) for axis in measured])
@@ -179,6 +232,8 @@ def _enough(run: PositioningRuns) -> bool:
     if isinstance(run, CircularTest):
         return run.both and run.widest_gap <= _APART
     least = max(LEAST_TARGETS, PER_METRE * run.length_mm / METRE)
+    if run.angular:
+        least = next(count for most, count in _ANGULAR_TARGETS if np.ptp(run.targets) <= most)
     return run.repeats >= REPEATS and len(run.targets) >= least and _bare(run) * (least - 1) <= _UNEVEN * (1 + 1e-9)
 
 
@@ -212,28 +267,35 @@ def conditions(
                     bare=100 * _bare(run),
                 )
             )
-        if recorded and run.both and np.array_equal(run.x[0], run.x[1]):
+        read = recorded and np.ptp(run.x) > 0  # and not planned beside a recording
+        if read and run.both and np.array_equal(run.x[0], run.x[1]):
             few.append(say("measurement {number}: both directions are the same to the last digit", number=number))
         alike = np.all(run.x[..., :, None] == run.x[..., None, :], axis=(0, 1)) & ~np.eye(run.repeats, dtype=bool)
-        if recorded and alike.any():
+        if read and alike.any():
             first, second = (np.argwhere(alike)[0] + 1).tolist()
             same = {"number": number, "first": first, "second": second}
             few.append(say("measurement {number}: repeat {second} is repeat {first} to the last digit", **same))
+    what = _TURNS if of is axes and artefact.angular else what
     return (Condition(what, tuple(few) if runs else (what,)),)
+
+
+def _unstated(key: str, artefact: ArtefactFacts) -> str | None:
+    """The key that says how uncertain the instrument is, where neither it nor that of a polygon does."""
+    return None if not key or any(getattr(artefact, one, None) for one in (key, "u_polygon_arcsec")) else key
 
 
 def _characteristics(
     names: Sequence[str], of: Callable[[Artefact], Runs], what: str, asked: Text, key: str
 ) -> tuple[Characteristic, ...]:
-    def unstated(artefact: ArtefactFacts) -> str | None:
-        return None if not key or getattr(artefact, key, None) else key
-
     decides, whole = partial(positioning, of=of, what=what, key=key), partial(conditions, of=of, what=asked)
-    each = ((name, POSITIONING, partial(decides, figure=name), whole, unstated) for name in names)
-    return tuple(Characteristic(*one, lines=LINES) for one in each)
+    each = ((name, POSITIONING, partial(decides, figure=name), whole, partial(_unstated, key)) for name in names)
+    return tuple(Characteristic(*one, lines=LINES, angle=of is axes) for one in each)
 
 
 _RUNS = say("five runs in each direction, five targets a metre and five at least, over two thirds of the travel")
+_TURNS = say(
+    "five runs in each direction, 3, 5 or 8 targets over up to 90°, 180° or 360°, over two thirds of the travel"
+)
 # Figures of axes against the laboratory's own limits, read at rest or in motion
 OWN_RULE = "laboratory's own rule"
 OF_AXES = tuple(
@@ -241,8 +303,9 @@ OF_AXES = tuple(
         figure,
         POSITIONING,
         partial(positioning, figure=figure, of=axes, what="positioning", key="u_scale_um_per_m", own=True),
-        unstated=lambda artefact: None if getattr(artefact, "u_scale_um_per_m", None) else "u_scale_um_per_m",
+        unstated=partial(_unstated, "u_scale_um_per_m"),
         lines=LINES,
+        angle=True,
     )
     for figure in "AERBM"
 )
@@ -259,14 +322,15 @@ ISO_230_4_2005 = (*_OF_CIRCLES(["G(b)"], key=""), *_OF_CIRCLES(["D"], key="u_bar
 _ISO_230_2 = (
     Clause(
         "scope", say("scope"),
-        "Linear axes up to 2 m, both directions; of longer and of rotary axes the same formulas.",
-        "its publisher's abstract; 2 m: as commonly reported",
+        "Linear axes up to 2 m, of longer ones the same formulas; rotary axes up to 360°. Both directions.",
+        "its publisher's abstract; 2 m, 360°: as commonly reported",
     ),
     Clause(
         "targets_and_runs", say("targets and runs"),
         "Five runs in each direction; five targets a metre and five at least, the axis at rest at each: readings in motion "
-        "are not decided. Each axis over two thirds of its travel, no two neighbours farther apart than twice the spacing of "
-        "as few even targets. That targets are not evenly spaced is not asked for.",
+        "are not decided. Of a rotary axis 3 targets up to 90°, 5 up to 180°, 8 beyond. Each axis over two thirds of its "
+        "travel, no two neighbours farther apart than twice the spacing of as few even targets. That targets are not evenly "
+        "spaced is not asked for.",
         "as commonly reported; at rest: GOST ISO 230-2-2016, its translation; two thirds, twice: this project",
     ),
     Clause(

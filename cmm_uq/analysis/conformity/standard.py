@@ -23,6 +23,7 @@ from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty, needed, needs_prior
 from cmm_uq.machine.model.artefact import Artefact, Indications
+from cmm_uq.machine.model.kind import POSITIONING
 from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import Quantity, nominal
 
@@ -98,6 +99,8 @@ class Standard:
             return None
         one = self.characteristic(wish.characteristic)
         if one.lines and one.lines != uncertainty.FORM_LINES and all(stated.declared(line) for line in one.lines):
+            return None
+        if one.observed == POSITIONING and wish.limit_arcsec is not None:  # its recording says by what
             return None
         if one.needs is None or getattr(stated, one.needs) or stated.u_temperature_k or stated.u_fixturing_um:
             return one.unstated(artefact)
@@ -213,6 +216,8 @@ class Test:
     def least_u(self, lengths_mm: Floats) -> Floats:
         """(m,) µm: half the laboratory's capability, k = 2 (ILAC-P14:09/2020), at lengths (m,); 0 where none is given."""
         cmc = self.circumstances.cmc
+        if cmc and self.artefact.angular:  # as an arc where 1 µm is 1″
+            return np.full(len(lengths_mm), 0.5 * cmc.least(unit("″"), 0.0))
         return np.array([0.5 * cmc.least(unit("µm"), float(each)) if cmc else 0.0 for each in lengths_mm])
 
     def at_least(self, u_um: float, length_mm: float) -> float:

@@ -16,7 +16,7 @@ from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.tables.conformity import LINE_KEYS, Circumstances, RatedConditions, TestUncertainty
+from cmm_uq.jobs.tables.conformity import Circumstances, RatedConditions, TestUncertainty, key_of_line
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget
 
@@ -40,19 +40,16 @@ _NAMES = {
 def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
     """That each of some lines is stated or declared, and what it is computed from recorded and stated."""
     found = []
-    for line in lines:
+    for line in _acting(lines, artefact):
         if not _met(line, artefact, under):
-            key = (
-                f"{artefact.key_of_u} in [artefact]"
-                if line == "calibration"
-                else f"{LINE_KEYS[line]} in [test_uncertainty]"
-            )
+            beside = f"{key_of_line(line, angular=artefact.angular)} in [test_uncertainty]"
+            key = f"{artefact.key_of_u} in [artefact]" if line == "calibration" else beside
             what = say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line])
-            declared = f'{line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]'
-            found.append(_lacks(what, f"{key}, or {declared}"))
-    stated = under.uncertainty
-    acts = stated.u_temperature_k and not stated.declared("temperature")
-    if "temperature" in lines and "expansion" not in lines and acts and not under.cte_per_k:
+            found.append(
+                _lacks(what, f'{key}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]')
+            )
+    acts = under.uncertainty.u_temperature_k and not under.uncertainty.declared("temperature")
+    if "temperature" in _acting(lines, artefact) and "expansion" not in lines and acts and not under.cte_per_k:
         what = say("uncertainty: that of the temperature is stated, and no expansion coefficient by which it acts")
         found.append(_lacks(what, "cte_per_k in [artefact], or temperature in [test_uncertainty.negligible]"))
     if "form" in lines and artefact.form <= 0:
@@ -73,11 +70,15 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
         "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
         "expansion": away_from_20(artefact) * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
     }
-    missing = {line for line in lines if not _met(line, artefact, under)}
+    missing = {line for line in _acting(lines, artefact) if not _met(line, artefact, under)}
     if "expansion" in lines and not under.cte_per_k and not under.uncertainty.declared("expansion"):
         missing.add("expansion")
     each = [per_length[line] * length_mm / MICROMETRE if line in per_length else UNSTATED_UM for line in missing]
     return float(np.linalg.norm(each)) if each else 0.0
+
+
+def _acting(lines: Collection[str], artefact: Artefact) -> list[str]:
+    return [line for line in lines if not (artefact.angular and line == "temperature")]  # uniform, it changes no angle
 
 
 def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:
@@ -87,9 +88,9 @@ def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:
         found = artefact.indications()
         u = np.array([size.sd for size in artefact.sizes]) if found is None else found.u
         return stated.declared(line) is not None or bool(np.all(u > 0))
-    if line == "repeat" and _both_lines(under) and _two_readings(1.0, under) > 0:
+    if line == "repeat" and not artefact.angular and _both_lines(under) and _two_readings(1.0, under) > 0:
         return True
-    return bool(getattr(stated, LINE_KEYS[line]) or stated.declared(line))
+    return bool(getattr(stated, key_of_line(line, angular=artefact.angular)) or stated.declared(line))
 
 
 def u_of_repeats(length_mm: float, under: Circumstances) -> float:

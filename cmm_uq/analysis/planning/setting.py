@@ -56,8 +56,9 @@ class Volume:
                 if box[i, 0] < low - _ROUNDING or box[i, 1] > high + _ROUNDING:  # false where the travel is not known
                     raise CmmUqError(
                         f"{axis} = [{box[i, 0]:g}, {box[i, 1]:g}] mm goes beyond the travel of {low:g} to {high:g} mm",
-                        where="job.toml [plan] volume_mm", fix="Keep inside the travel, or mend [machine] travel_mm",
-                    )  # fmt: skip
+                        where="job.toml [plan] volume_mm",
+                        fix="Keep inside the travel, or mend [machine] travel_mm",
+                    )
             elif isinstance(machine, Arm):  # whose joints have travels
                 continue
             elif recorded is not None and not np.all(np.isfinite(machine.travel_mm[i])):
@@ -113,13 +114,15 @@ class Volume:
         if extent[axis] - self.size[axis] <= _ROUNDING:
             return CmmUqError(
                 f"no height of {self.heights[0]:g} to {self.heights[1]:g} mm leaves room for it ({title})",
-                where="job.toml [plan.fixtures] heights_mm", fix="Allow other heights, or name another plan",
-            )  # fmt: skip
+                where="job.toml [plan.fixtures] heights_mm",
+                fix="Allow other heights, or name another plan",
+            )
         return CmmUqError(
             f"the artefact is {extent[axis]:.4g} mm long along {AXES[axis].upper()} ({title}), of which the volume has "
-            f"{self.size[axis]:.4g} mm", where="job.toml [plan] volume_mm or [machine] travel_mm",
+            f"{self.size[axis]:.4g} mm",
+            where="job.toml [plan] volume_mm or [machine] travel_mm",
             fix="Use a smaller artefact, another plan, or a smaller margin_mm",
-        )  # fmt: skip
+        )
 
 
 def turned_set_ups(placings: Sequence[SetUp], volume: Volume) -> Iterator[SetUp]:
@@ -333,6 +336,16 @@ class Setting:
         """Set-ups as one recording, in the order and at the times at which they are measured."""
         of_point, of_placing = self.plan.seconds_per_point, self.plan.minutes_per_placing
         return join(placings, seconds_per_point=of_point, minutes_per_placing=of_placing, columns=self.plan.columns)
+
+    def completed(self, placings: Sequence[SetUp]) -> tuple[SetUp, ...]:
+        """Set-ups that were not made from the recording, with its other columns at their means."""
+        means = {} if self.recorded is None else {k: float(v.mean()) for k, v in self.recorded.own_columns.items()}
+        return tuple(
+            replace(one, points=replace(one.points, columns={
+                **{name: np.full(len(one.points), mean) for name, mean in means.items()}, **one.points.columns,
+            }))
+            for one in placings
+        )  # fmt: skip
 
     def sized(self, points: Points) -> Setting:
         """The same with the artefact's length as these points show it, where its certified figures stand in the recording."""

@@ -80,6 +80,7 @@ class AxisRuns(Artefact):
         self.rows = np.flatnonzero(~end)[:, None]
         own = points.select(~end)
         self.runs = runs_of(own, where)
+        self.angular = any(run.table for run in self.runs)
         self._zeros, self._own = self._zeros_of(own), own
         self._polygon = tuple(run for run in self.runs if run.table and FACE in own.columns)
         self._kind = kinds_of(self.runs, len(own))
@@ -344,9 +345,10 @@ class AxisRuns(Artefact):
         if run in self._polygon:
             u = self._facts.u_polygon_arcsec
             u = float(np.sqrt(np.mean(self._u_faces[run.rows] ** 2))) if u is None else u
-            return replace(found, u_reference=u, growth=np.ones(len(found.targets)), by_target=True)
+            ones = np.ones(len(found.targets))
+            return replace(found, axis=run.table, u_reference=u, growth=ones, by_target=True)
         own = [size for size in self.sizes if size.name.startswith(f"reference_{run.measurement}_")]
-        return replace(found, u_reference=own[0].sd if own else 0.0, growth=growth)
+        return replace(found, axis=run.table, u_reference=own[0].sd if own else 0.0, growth=growth)
 
     def _reads(self, letter: str) -> float:
         """Whether a table's reading grows by the right hand: 1, or −1."""
@@ -362,7 +364,7 @@ class AxisRuns(Artefact):
         return np.array(getattr(fly, run.axis) if fly and run.axis else [], dtype=np.float64)
 
     def positionings(self) -> Mapping[int, PositioningRuns]:
-        return {run.measurement: self.positioning(run) for run in self.runs if run.kind in (ALONG, CIRCLE)}
+        return {run.measurement: self.positioning(run) for run in self.runs if run.kind in (ALONG, CIRCLE) or run.table}
 
 
 def _ends_of(points: Points) -> Ints:

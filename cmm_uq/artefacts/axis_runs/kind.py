@@ -91,6 +91,22 @@ CIRCLES = Beginning(
     conformity={"standard": "ISO 230-4:1996", "characteristic": "G", "limit_um": 15.0, "rule": "ISO 14253-1"},
     test=circumstances(u_alignment_um=0.1, u_temperature_k=0.1, u_repeat_um=0.2), noise_um=0.3,
 )  # fmt: skip
+_BY_LABORATORY = {"by": "the laboratory", "reason": "the polygon stands on the axis, level to 10 arcsec"}
+POLYGON = Beginning(
+    title="A rotary table against a polygon, by autocollimator (ISO 230-2)",
+    numbering="One measurement is one setting of the polygon on the table; its points are the faces there, and back.",
+    artefact={"name": "Polygon of 12 faces", "u_polygon_arcsec": 0.1},
+    effects=("rotary_positioning_c_1", "rotary_positioning_c_2", "rotary_play_c"),
+    machine={"chain": "XYZ|C", "origin_mm": [350.0, 500.0, -500.0], "table": {"travel_deg": [0.0, 360.0]}},
+    plan={"ready": "polygon", "repeats": 5}, recorded=AT_20_C, noise_um=0.02,
+    columns={
+        "reading_arcsec": "By how much the face is turned beyond its nominal place, by the right hand.",
+        **{f"turn_{a}": f"Axis of the table, its part along {a}." for a in AXES}, "c_deg": "", "c_approach": "",
+        "face": "Number of the face that is read.", "face_arcsec": "Certified deviation of its angle.",
+    },
+    conformity={"standard": "ISO 230-2:2014", "characteristic": "A", "limit_arcsec": 15.0, "rule": "ISO 14253-1"},
+    test=circumstances(u_repeat_arcsec=0.05, negligible={"alignment": _BY_LABORATORY}),
+)  # fmt: skip
 _RUNS = "cmm_uq.artefacts.axis_runs"
 AXIS_RUNS = Kind(
     "axis_runs", AxisRunsFacts, f"{_RUNS}.artefact:AxisRuns", f"{_RUNS}.plan:SCREENING", f"{_RUNS}.plan:PLANNING",
@@ -119,5 +135,5 @@ AXIS_RUNS = Kind(
             "square": "Number of the setting of a square, the same along both of its legs; 0 without one.",
         },
     ),
-    begin_also={"circular_test": f"{_RUNS}.kind:CIRCLES"}, tested=(POSITIONING,),
+    begin_also={"circular_test": f"{_RUNS}.kind:CIRCLES", "polygon": f"{_RUNS}.kind:POLYGON"}, tested=(POSITIONING,),
 )  # fmt: skip

@@ -9,13 +9,15 @@ import numpy as np
 
 from cmm_uq.analysis.planning import candidates
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words
-from cmm_uq.analysis.planning.setting import Planning, Setting, Volume
+from cmm_uq.analysis.planning.setting import Planning, Setting, Start, Volume
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, no_references, rows_by
 from cmm_uq.artefacts.axis_runs.artefact import AxisRuns
 from cmm_uq.artefacts.axis_runs.kind import READ, TURN
-from cmm_uq.artefacts.axis_runs.run import READINGS
+from cmm_uq.artefacts.axis_runs.run import FACE, FACE_ANGLE, READINGS
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 
@@ -65,6 +67,7 @@ def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
 
 SCREENING = Screening(shape_of)
 _DEGREES = 5.0  # between targets on a circle
+POLYGON = "polygon"
 STEPS = 10  # between targets along each axis, where the plan does not say
 
 
@@ -131,6 +134,55 @@ def run_pattern(setting: Setting, length: float, sense: Floats, *, turns: bool) 
     return Pattern(body, np.arange(1, n + 1), np.ones(n, dtype=np.int64), columns, vectors).repeated(plan.repeats)
 
 
+def polygon(setting: Setting, *, shift: int = 0, part: float = 0.0) -> SetUp:
+    """A polygon on the rotary table, its faces read by an autocollimator there and back.
+
+    ``shift``: by how many faces it is turned against the table; ``part``: of a face by which it is turned besides.
+    """
+    machine, faces = setting.machine, setting.plan.faces
+    if not isinstance(machine, RotaryMachine) or not machine.tables:
+        fix = 'Give the table in [machine] chain, such as "XYZ|C"'
+        raise CmmUqError(
+            "a polygon stands on a rotary table, which the chain has not", where="job.toml [plan] ready", fix=fix
+        )
+    table = machine.tables[-1]
+    limits = np.where(np.isnan(table.travel_deg), [0.0, 360.0], table.travel_deg)
+    low = max(float(limits[0]), min(0.0, float(limits[1]) - 360.0))
+    out = np.asarray(low + (np.arange(faces) + part) * 360.0 / faces, dtype=np.float64)
+    out = out[out <= min(float(limits[1]), low + 360.0 - _SAME_MM)]
+    if len(out) < 2:
+        problem = f"the travel of {table.letter.upper()} shows fewer than two faces of a polygon of {faces}"
+        raise CmmUqError(problem, where="job.toml [plan] faces", fix="Mend travel_deg, or take a polygon of more faces")
+    at, way = np.append(out, out[::-1]), np.repeat([1.0, -1.0], len(out)).astype(np.float64)
+    face = (np.tile(np.arange(len(out)), 2) + shift) % faces + 1.0
+    face[len(out) :] = face[: len(out)][::-1]
+    times, n = setting.plan.repeats, 2 * len(out)
+    columns: dict[str, Floats] = {name: np.zeros(n) for name in (*READINGS.values(), *READ, *TURN)}
+    turned = (TURN[table.about], np.ones(n)), (table.column, at), (f"{table.letter}_approach", way), (FACE, face)
+    columns |= {name: np.asarray(values, dtype=np.float64) for name, values in turned}
+    columns |= {FACE_ANGLE: np.zeros(n)} if getattr(setting.artefact, "u_polygon_arcsec", None) is not None else {}
+    number, repeat = np.tile(np.arange(1, n + 1), times), np.repeat(np.arange(1, times + 1), n)
+    place = np.tile(machine.pivot(table), (n * times, 1))
+    whole = {name: np.tile(values, times) for name, values in columns.items()}
+    words = say("Polygon turned by {angle:.4g}° against the table", angle=(shift + part) * 360.0 / faces)
+    return SetUp(words, Points(place, np.ones(len(place), dtype=np.int64), number, repeat, machine, whole))
+
+
+def polygons(setting: Setting) -> tuple[SetUp, ...]:
+    """One setting of a polygon with certified faces; of another one two, a face apart, by which table and faces are parted."""
+    known = getattr(setting.artefact, "u_polygon_arcsec", None) is not None
+    return tuple(polygon(setting, shift=shift) for shift in ((0,) if known else (0, 1)))
+
+
+def _candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
+    """Lines in the volume; of a polygon its faces at other angles of the table, and turned against it."""
+    if setting.plan.ready != POLYGON:
+        return _PLACES.candidates(setting, start)
+    faces = setting.plan.faces
+    shifts = sorted({round(i * faces / 4) % faces for i in range(4)} | {1})
+    return setting.completed([polygon(setting, shift=s, part=part) for s in shifts for part in (0.0, 0.25, 0.5, 0.75)])
+
+
 def _shape(setting: Setting) -> Pattern:
     length = setting.plan.length_mm or float(setting.volume.size.min())
     return run_pattern(setting, length, np.eye(3)[0], turns=False)
@@ -139,6 +191,8 @@ def _shape(setting: Setting) -> Pattern:
 def elsewhere(artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
     """The targets of a recorded run, displacements read along other lines."""
     run = cast("AxisRuns", artefact).runs[0]
+    if run.table:
+        return ()
     own = artefact.points.select(artefact.rows[run.rows, 0])
     along = {name: np.full(len(own), part) for name, part in zip(READ, run.travel, strict=True)}
     still = dict.fromkeys(TURN, np.zeros(len(own)))
@@ -150,5 +204,7 @@ def elsewhere(artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ..
 _RELOCATED = candidates.RelocatedCandidates(candidates.along_lines)
 _PLACES = candidates.VolumeCandidates(candidates.along_lines, _shape, _RELOCATED)
 PLANNING = Planning(
-    {"positioning": positioning, "all errors": all_errors, "circles": circles}, _PLACES.candidates, elsewhere
+    {"positioning": positioning, "all errors": all_errors, "circles": circles, POLYGON: polygons},
+    _candidates,
+    elsewhere,
 )

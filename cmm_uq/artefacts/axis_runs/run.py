@@ -27,6 +27,7 @@ END, TARGET, START, ZERO = "_arm_end", "_target_mm", "_start_mm", "_zero_mm"
 FACE, FACE_ANGLE = "face", "face_arcsec"  # columns: number of a polygon's face, and its certified deviation
 STRAIGHTEDGE, SQUARE = "straightedge", "square"  # columns: +1, and −1 reversed; number of the setting
 _UNIT, _SAME_MM = 0.01, 1e-6
+_STILL_MM = 0.01  # by which carriages that stand still may be read otherwise while a table turns
 _ALONG, _ACROSS = 0.999, 0.05  # cosines between what is read and the travel
 _CUBIC = 5  # targets of which one lies between two on either side
 _ROUND = 0.02  # of its radius, by which targets may be off a circle
@@ -332,7 +333,7 @@ def _of_table(points: Points, number: int, rows: Ints) -> Run | None:
     """A run of a rotary table, read about its axis while the carriages stand still; ``None`` where it is none."""
     machine, turn = points.machine, vectors(points, TURN)[rows]
     tables = machine.tables if isinstance(machine, RotaryMachine) else ()
-    for table in tables if np.ptp(points.xyz[rows], axis=0).max() < _SAME_MM else ():
+    for table in tables if np.ptp(points.xyz[rows], axis=0).max() < _STILL_MM else ():
         about, zero = np.eye(3)[table.about], np.zeros(len(points))
         read = points.columns.get(table.column, zero)[rows]
         if np.ptp(read) > 0 and np.abs(np.abs(turn @ about) - 1).max() < _UNIT:
@@ -370,13 +371,14 @@ def faces_of(
     found = inverse @ readings[rows]
     q, rank = len(numbers) - 1, int(np.linalg.matrix_rank(design))
     dof = len(rows) - rank
-    if rank < design.shape[1] - 1 or not dof:  # all positions and all zeros are known but for a constant
+    # all positions and all zeros are known but for a constant; of one setting of several that are planned they are not yet
+    if len(points.lines) and (rank < design.shape[1] - 1 or not dof):
         raise CmmUqError(
             "the settings of the polygon do not part its faces from the table's errors",
             where=where or "recording",
             fix="Read all faces in two settings one face apart, or more, or give face_arcsec and u_polygon_arcsec",
         )
-    s = np.sqrt(np.sum((readings[rows] - design @ found) ** 2) / dof)
+    s = np.sqrt(np.sum((readings[rows] - design @ found) ** 2) / max(dof, 1))
     profile, u = np.zeros(n), np.zeros(n)
     profile[rows] = blocks[0] @ found[:q]
     u[rows] = s * (blocks[0] @ np.linalg.norm(inverse[:q], axis=1))

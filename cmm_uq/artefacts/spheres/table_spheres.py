@@ -23,6 +23,7 @@ from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.rotary import RotaryAxis, RotaryMachine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
+from cmm_uq.machine.model.kind import AT_20_C, Beginning
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.maths.inference.linear_model import Freedoms
 
@@ -243,17 +244,28 @@ def two_spheres(setting: Setting, *, radius: float = 1.0, height: float = 1.0, t
 
 
 def _candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    """The spheres farther in, lower, and a quarter of a turn on."""
+    """The spheres farther in, lower, and a quarter of a turn on; of several axes the others at further angles, too."""
     parts = [(r, h, turn) for r in (1.0, 0.5) for h in (1.0, 0.5) for turn in (0.0, 0.5 * np.pi)]
+    parts = parts[:1] if cast("TableSpheresFacts", setting.artefact).stay else parts
     if _turning(setting.machine).fourth is None:
-        return tuple(one for r, h, turn in parts for one in runs(setting, radius=r, height=h, turn=turn))
-    return tuple(two_spheres(setting, radius=r, height=h, turn=turn) for r, h, turn in parts)
+        usual = [one for r, h, turn in parts for one in runs(setting, radius=r, height=h, turn=turn)]
+        further = [one for part in parts[:2] for one in runs(setting, turn=part[2], stands=_FURTHER)]
+        return setting.completed([*usual, *further])
+    return setting.completed([two_spheres(setting, radius=r, height=h, turn=turn) for r, h, turn in parts])
 
 
-def runs(setting: Setting, *, radius: float = 1.0, height: float = 1.0, turn: float = 0.0) -> tuple[SetUp, ...]:
+def runs(
+    setting: Setting,
+    *,
+    radius: float = 1.0,
+    height: float = 1.0,
+    turn: float = 0.0,
+    stands: Sequence[float] = (0.25, 0.75),
+) -> tuple[SetUp, ...]:
     """Each axis there and back over a turn, or its travel, while each other stands low and high; then all at once.
 
-    Two spheres on the last table; one in the middle of the volume where nothing but the probe turns.
+    Two spheres on the last table; one in the middle of the volume where nothing but the probe turns. ``stands``: parts of its
+    travel at which an axis stands meanwhile.
     """
     machine, found = _turning(setting.machine), list[SetUp]()
     spheres = setting.volume.box.mean(axis=1)[None] - machine.origin_mm
@@ -262,15 +274,15 @@ def runs(setting: Setting, *, radius: float = 1.0, height: float = 1.0, turn: fl
     out = {axis.letter: np.linspace(*_range(axis), STEPS + 1) for axis in machine.rotary}
     for axis in machine.rotary:
         others = [other for other in machine.rotary if other is not axis]
-        for part in _STANDS if others else _STANDS[:1]:
-            stands = {other.letter: float(np.quantile(out[other.letter], part)) for other in others}
-            found.append(_run(setting, spheres, (axis,), out, stands))
+        for part in stands if others else stands[:1]:
+            at = {other.letter: float(np.quantile(out[other.letter], part)) for other in others}
+            found.append(_run(setting, spheres, (axis,), out, at))
     if len(machine.rotary) > 1:
         found.append(_run(setting, spheres, machine.rotary, out, {}))
     return tuple(found)
 
 
-STEPS, _STANDS = 12, (0.25, 0.75)  # of a run each way; parts of its travel at which an axis stands meanwhile
+STEPS, _FURTHER = 12, (0.0, 0.5, 1.0)  # of a run each way; further parts of its travel at which an axis may stand
 
 
 def _range(axis: RotaryAxis) -> tuple[float, float]:
@@ -306,3 +318,39 @@ def _run(
 
 
 PLANNING = Planning({"ISO 10360-3": lambda setting: (two_spheres(setting),), "runs": runs}, _candidates)
+
+_TRUNNION = tuple(
+    f"rotary_{name}"
+    for name in (
+        "location_a_y",
+        "location_a_z",
+        "tilt_a_y",
+        "tilt_a_z",
+        "positioning_a_1",
+        "location_c_x",
+        "location_c_y",
+        "tilt_c_x",
+        "tilt_c_y",
+        "positioning_c_1",
+    )
+)
+FIVE_AXES = Beginning(
+    title="Five axes: spheres on a trunnion and its table (R-test)",
+    numbering="One measurement is one run: an axis there and back while the other stands; points 1 and 2 are the centres of "
+    "the spheres, repeat counts the positions in their order.",
+    artefact={"name": "Spheres A and B", "radius_mm": 120.0, "height_mm": 120.0, "stay": True},
+    effects=_TRUNNION,
+    noise_um=0.3,
+    machine={
+        "chain": "XYZ|AC",
+        "origin_mm": [350.0, 500.0, -300.0],
+        "rotary": [
+            {"name": "A", "axis_mm": [350.0, 500.0, -260.0], "travel_deg": [-30.0, 100.0]},
+            {"name": "C", "travel_deg": [0.0, 360.0]},
+        ],
+    },
+    columns={"a_deg": "", "c_deg": ""},
+    further={"a_approach": "", "c_approach": ""},
+    plan={"ready": "runs", "repeats": 1},
+    recorded=AT_20_C,
+)

@@ -330,9 +330,9 @@ def _frame(ax: Axes, box: Floats) -> None:
 
 def _outline(readings: Floats) -> list[int]:
     """Rows to join: along a line from end to end, about a surface through its outermost points."""
-    if len(readings) == 1:
-        return [0, 0]
     about = readings - readings.mean(axis=0)
+    if np.abs(about).max() < 1e-6:  # nothing but a rotary axis moves
+        return [0, 0]
     _, size, axes = np.linalg.svd(about, full_matrices=False)
     if len(size) < 2 or size[1] < 1e-3 * size[0]:
         along = about @ axes[0]

@@ -124,11 +124,14 @@ class TestUncertainty(JobTable):
     u_form_um: Uncertainty = key(0.0, "Standard uncertainty of the calibrated form deviation of a test sphere.")
     u_repeat_um: Uncertainty = 0.0
     """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between."""
+    u_alignment_arcsec: Uncertainty = 0.0
+    """Of angles of a rotary axis: standard uncertainty at each target by how polygon and autocollimator are aligned."""
+    u_repeat_arcsec: Uncertainty = key(0.0, "Of angles of a rotary axis: what changes between readings.")
     negligible: NegligibleLines = key(NegligibleLines(), "Lines that are declared negligible, by whom and why.")
     machine: MachineLines = key(MachineLines(), "Lines that are declared the machine's own, by whom and why.")
 
     def problems(self) -> Iterator[str]:
-        for line, stated in LINE_KEYS.items():
+        for line, stated in (*LINE_KEYS.items(), *ANGULAR_KEYS.items()):
             declared = sum(bool(getattr(table, line, None)) for table in (self.negligible, self.machine))
             if declared > 1 or (declared and getattr(self, stated)):
                 yield f"{line} is stated more than once: give {stated}, or declare it in one table"
@@ -145,11 +148,18 @@ class TestUncertainty(JobTable):
 
 
 # key of each line of the test uncertainty but the calibration, which ``[artefact]`` states
+ANGULAR_KEYS = {"alignment": "u_alignment_arcsec", "repeat": "u_repeat_arcsec"}  # of angles, in place of the others
 LINE_KEYS = {
     "expansion": "u_cte_per_k", "temperature": "u_temperature_k", "alignment": "u_alignment_um",
     "fixturing": "u_fixturing_um", "form": "u_form_um", "repeat": "u_repeat_um",
 }  # fmt: skip
 TEST_KEYS = tuple(LINE_KEYS.values())
+
+
+def key_of_line(line: str, *, angular: bool) -> str:
+    return (LINE_KEYS | ANGULAR_KEYS if angular else LINE_KEYS).get(line, line)
+
+
 Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2), RISING]
 Kelvins = Annotated[float, Field(gt=0, le=1000)]
 

@@ -121,6 +121,7 @@ class PlanFacts(JobTable):
     """Distance of neighbouring faces of a gauge (20 mm by default) or balls of a plate."""
     grid: Annotated[list[Annotated[int, Field(ge=2, le=100)]], Field(min_length=2, max_length=2)] = [5, 5]
     """Balls of a plate, or points on a surface, along each side."""
+    faces: Annotated[int, Field(ge=3, le=360)] = key(12, "Faces of a polygon on a rotary table.")
     both_ways: bool | None = None
     """Whether faces of a gauge are met on the way back too; the ready plan of ISO 10360-2 does so by default."""
     repeats: Annotated[int, Field(ge=1, le=20)] = key(3, "How often each point is measured.")

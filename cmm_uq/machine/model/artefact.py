@@ -130,6 +130,7 @@ class Artefact(ABC):
     # whether each set-up reads a curve of its own, of which a model names the simplest form: outliers show among repeats,
     # and what is found predicts other points, not other set-ups
     curves: ClassVar[bool] = False
+    angular: bool = False  # whether what it positions are angles of rotary axes
     moving: bool = False  # whether its readings were taken in motion, repeats of one at other places
     form: float = 0.0  # deviation of its own form by its certificate, mm; 0 where it is not stated
     # Sxy, Syz, Szx, rad, of axes on which its observations were found: where estimates begin

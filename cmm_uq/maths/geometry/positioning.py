@@ -54,7 +54,8 @@ class PositioningRuns:
     targets: Floats  # (t,) ascending
     x: Floats  # (d, t, n) deviations by direction, target and repeat; d = 1 where all came from one side
     arrows: str = "↑↓"  # of the directions; "↓" where all came from above
-    axis: str = ""  # that is positioned; empty along a diagonal, or where something else is read
+    # that is positioned, a, b or c by angles in ″ at targets in °; empty along a diagonal, or where something else is read
+    axis: str = ""
     # standard uncertainty of what the instrument reads against, µm or ″, where it is largest; what part of it acts at each
     # target (t,); over what length temperature and alignment act, mm, 0 where they do not
     u_reference: float = 0.0
@@ -112,6 +113,10 @@ class PositioningRuns:
             readings = readings - np.polyval(np.polyfit(positions, readings, 1), positions)
         x[side, target, repeat] = readings
         return cls(edges, x, "↑↓" if len(sides) == 2 else "↓" if sides[0] < 0 else "↑")
+
+    @property
+    def angular(self) -> bool:
+        return self.axis in ("a", "b", "c")
 
     @property
     def both(self) -> bool:

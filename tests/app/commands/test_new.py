@@ -45,6 +45,7 @@ from tests.result_keys import RESULTS, described
 
 NAMES = (
     *BUILT_IN, "shift_plate", "circular_test", "arm_sphere", "arm_orientations", "arm_lengths", "robot_poses",
+    "polygon", "five_axes",
 )  # fmt: skip
 
 

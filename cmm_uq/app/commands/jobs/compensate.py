@@ -363,10 +363,11 @@ def _chain(job: Job, cloud: Path, compensation: Compensation) -> tuple[Digitized
     digitizer = digitizer_of(job.facts.machine.digitizer, job.inputs, job.folder, job.origin)
     if digitizer is None:
         raise CmmUqError(
-            "the job describes no digitizer", where="job.toml [machine] digitizer",
+            "the job describes no digitizer",
+            where="job.toml [machine] digitizer",
             fix="digitizer = { offset_mm = [U1, V1, W1], poses = [ { alpha_deg = …, beta_deg = …, gamma_deg = … } ] }, "
             'or { calibration = "FOLDER" }',
-        )  # fmt: skip
+        )
     offset = np.array(digitizer.offset_mm)
     angles = {one.pose: np.radians([one.alpha_deg, one.beta_deg, one.gamma_deg]) for one in digitizer.poses}
     poses = {pose: Digitizer(euler_313(*each), offset, compensation) for pose, each in angles.items()}
