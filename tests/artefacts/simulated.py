@@ -26,22 +26,26 @@ SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
 SQUARE = {"squareness_xy": 12.0, "squareness_yz": -7.5, "squareness_zx": 4.0}
 
 
+def shared(name: str, make: Callable[[], bytes]) -> bytes:
+    """What another process of this run may have made already; two at once make the same."""
+    folder = os.environ.get("CMM_UQ_TESTS_SHARE")
+    if folder is None:
+        return make()
+    path = Path(folder) / name
+    if not path.exists():
+        own = path.with_suffix(f".{os.getpid()}")
+        own.write_bytes(make())
+        own.replace(path)
+    return path.read_bytes()
+
+
 def kept(make: Callable[[str], Document]) -> Callable[[str], Document]:
-    """Documents as another process of this run may have made them already; two at once make the same."""
+    """Documents by their job, each made once for all processes."""
 
     @cache
     def found(job: str) -> Document:
-        folder = os.environ.get("CMM_UQ_TESTS_SHARE")
-        if folder is None:
-            return make(job)
-        path = Path(folder) / f"{make.__name__}-{job}.pickle"
-        if not path.exists():
-            own = path.with_suffix(f".{os.getpid()}")
-            own.write_bytes(pickle.dumps(make(job)))
-            own.replace(path)
-        document = pickle.loads(path.read_bytes())
-        assert isinstance(document, Document)
-        return document
+        made: Document = pickle.loads(shared(f"{make.__name__}-{job}.pickle", lambda: pickle.dumps(make(job))))
+        return made
 
     return found
 
@@ -64,18 +68,13 @@ def document(job: str) -> Document:
 
 @cache
 def results(job: str) -> dict[str, Any]:
-    """Data of results.json, as any process of this run may have made them already."""
-    folder = os.environ.get("CMM_UQ_TESTS_SHARE")
-    if folder is None:
-        data = as_json(outcome(job).results)
-    else:
-        path = Path(folder) / f"results-{job}.json"
-        if not path.exists():
-            own = path.with_suffix(f".{os.getpid()}")
-            own.write_bytes(as_json(outcome(job).results))
-            own.replace(path)
-        data = path.read_bytes()
-    found: dict[str, Any] = json.loads(data)
+    """Data of results.json; whoever makes it makes the document too, lest another process analyse the same again."""
+
+    def make() -> bytes:
+        shared(f"document-{job}.pickle", lambda: pickle.dumps(outcome(job).document))
+        return as_json(outcome(job).results)
+
+    found: dict[str, Any] = json.loads(shared(f"results-{job}.json", make))
     return found
 
 

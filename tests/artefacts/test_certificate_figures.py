@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,12 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.report import outcome_of
 from cmm_uq.artefacts.shift.plane_page import EVERY
 from cmm_uq.certificate.document import Document, Table
-from cmm_uq.certificate.origin import as_json
 from tests.artefacts.reading import tables
-from tests.artefacts.simulated import analysed, document
+from tests.artefacts.simulated import document, results as results_of
 from tests.conftest import MACHINE_JOBS
 
 Record = Sequence[Any]
@@ -288,15 +285,10 @@ def missing(table: Table, records: Sequence[Record]) -> list[str]:
     return lost
 
 
-def read_back(example: str) -> Results:
-    found: Results = json.loads(as_json(outcome_of(analysed(example)).results))
-    return found
-
-
 @pytest.mark.long(but="bryan")
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_every_printed_number_stands_in_results_json(example: str) -> None:
-    results = read_back(example)
+    results = results_of(example)
     for caption, table in tables(document(example)).items():
         assert missing(table, RECORDS[caption](results)) == [], caption
 
@@ -304,7 +296,7 @@ def test_every_printed_number_stands_in_results_json(example: str) -> None:
 def test_a_figure_that_is_off_by_its_last_place_is_not_found() -> None:
     """The comparison itself can fail, in each column."""
     table = tables(document("sphere-simulated"))["Probing errors"]
-    records = RECORDS["Probing errors"](read_back("sphere-simulated"))
+    records = RECORDS["Probing errors"](results_of("sphere-simulated"))
     assert missing(table, records) == []
     for key in ("points", "form_error_um", "size_error_um"):
         (sphere,) = records[0]
@@ -357,14 +349,14 @@ def two_uncertainties(document: Document) -> list[str]:
 @pytest.mark.long(but="step-gauge")
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_no_quantity_has_two_uncertainties_without_a_reason(example: str) -> None:
-    results = {"conditional": {}, **read_back(example)}
+    results = {"conditional": {}, **results_of(example)}
     assert disagreeing(results) == []
     assert two_uncertainties(document(example)) == []
 
 
 def test_two_uncertainties_of_one_quantity_are_seen() -> None:
     """Without its reason, the second way to the factors of a ballbar is one, and so are they over the measuring range."""
-    results = read_back("iota-1102-20C")
+    results = results_of("iota-1102-20C")
     paths = [path.split(".")[0] for path in disagreeing({**results, "conditional": {}})]
     assert {one: paths.count(one) for one in paths} == {"over_range": 6, "regions": 6, "distance_equations": 6}
     found = document("iota-1102-20C")
@@ -380,7 +372,7 @@ def test_two_uncertainties_of_one_quantity_are_seen() -> None:
 
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_the_covariance_has_the_variance_of_every_estimate(example: str) -> None:
-    results = read_back(example)
+    results = results_of(example)
     covariance = results["covariance"]
     stated = {f"{effect}.{name}": quantity["u"] for effect, found in results["estimates"].items()
               for name, quantity in found.items()}  # fmt: skip
@@ -395,7 +387,7 @@ def test_the_covariance_has_the_variance_of_every_estimate(example: str) -> None
 
 def test_the_covariance_gives_the_uncertainty_of_a_difference() -> None:
     """The scales of an uncalibrated bar share one free part: a difference is far better known than either of them."""
-    results = read_back("bryan-simulated")
+    results = results_of("bryan-simulated")
     names, matrix = results["covariance"]["parameters"], results["covariance"]["matrix"]
     for one in results["differences"]:
         i, j = names.index(one["of"]), names.index(one["minus"])

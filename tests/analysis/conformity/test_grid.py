@@ -7,16 +7,20 @@ Values lie twenty u or more from the limit on the other side, so each rule turns
 from __future__ import annotations
 
 import itertools
+import pickle
+from functools import cache
 
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.conformity import own_rule
+from cmm_uq.analysis.conformity import own_rule, positioning
+from cmm_uq.analysis.conformity.positioning import uncertainty_of_figures
 from cmm_uq.analysis.conformity.standards import BUILT_IN, statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.tables.conformity import ConformityFacts, FalseAccept, GuardBand, Prior, Rule
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, FalseAccept, GuardBand, Prior, Rule
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS, POSITIONING
+from cmm_uq.maths.geometry.positioning import PositioningRuns
 from tests.analysis.conformity.tests_by_hand import TESTS, Hand, by_hand
 
 P95, P98 = float(stats.norm.ppf(0.95)), float(stats.norm.ppf(0.98))
@@ -67,6 +71,21 @@ def judged(hand: Hand, standard: str, characteristic: str, rule: str, room: floa
         None,
         hand.circumstances,
     )
+
+
+@pytest.fixture(autouse=True)
+def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The uncertainty of one recording's figures, against whatever limit."""
+    monkeypatch.setattr(positioning, "uncertainty_of_figures", spread_once)
+
+
+@cache
+def spread_of(inputs: bytes) -> dict[str, float]:
+    return uncertainty_of_figures(*pickle.loads(inputs))
+
+
+def spread_once(runs: PositioningRuns, under: Circumstances) -> dict[str, float]:
+    return spread_of(pickle.dumps((runs, under)))
 
 
 def test_every_characteristic_of_every_standard_is_in_the_grid() -> None:

@@ -198,7 +198,7 @@ def positioned(figure: str) -> Callable[..., Hand]:
         rows = run(1, X, at=targets, repeats=5, place=(100.0, -100.0))
         rows["reading_um"] = np.concatenate([[*x[0, :, k], *x[1, ::-1, k]] for k in range(5)])
         facts = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0 if how == "no u" else 0.1)
-        u = 0.1 if how == "no u" else spread_by_loops(tuple(x.ravel()), len(targets), figure)
+        u = 0.1 if how == "no u" else spread_by_loops(tuple(x.ravel()), len(targets))[figure]
         stated = changing(0.0 if how == "no u" else 0.05)
         return Hand(AxisRuns(facts, joined(rows)), stated, {}, POSITIONED[figure], u, False)
 
@@ -226,7 +226,7 @@ def in_motion(figure: str) -> Callable[..., Hand]:
             kind="axis_runs", u_scale_um_per_m=0.1 if known else 0.0,
             on_the_fly={"x": targets.tolist(), "u_delay_um": 0.02 if known else 0.0},
         )  # fmt: skip
-        u = spread_by_loops(tuple(x.ravel()), len(targets), figure, motion=True) if known else 0.1
+        u = spread_by_loops(tuple(x.ravel()), len(targets), motion=True)[figure] if known else 0.1
         asked = CompleteTest(measurements=1, repeats=5, points=72)
         stated = changing(0.05 if known else 0.0)
         return Hand(AxisRuns(facts, joined(rows)), stated, {}, POSITIONED[figure], u, False, asked)
@@ -235,8 +235,8 @@ def in_motion(figure: str) -> Callable[..., Hand]:
 
 
 @cache
-def spread_by_loops(x: tuple[float, ...], targets: int, figure: str, *, motion: bool = False) -> float:
-    """Standard uncertainty of a figure, µm, under the draws of the program, figure by figure in loops."""
+def spread_by_loops(x: tuple[float, ...], targets: int, *, motion: bool = False) -> dict[str, float]:
+    """Standard uncertainty of every figure, µm, under the draws of the program, figure by figure in loops."""
     random = np.random.default_rng(np.random.SeedSequence(230, spawn_key=(2,)))
     whole = np.array(x).reshape(2, targets, 5)
     along = 0.08 * random.standard_normal((2000, 1, 1, 1)) * np.linspace(0, 1, targets)[None, None, :, None]
@@ -247,11 +247,12 @@ def spread_by_loops(x: tuple[float, ...], targets: int, figure: str, *, motion: 
         along = along + left_out * random.standard_normal((2000, 1, targets, 1))
         delay = 0.02 * random.standard_normal(2000)
         along = along + np.stack([delay, -delay], axis=1)[:, :, None, None]
-    once, more = (
-        [by_loops(whole + change)[figure] - by_loops(whole)[figure] for change in along + times * each]
-        for times in (1.0, 3**0.5)
-    )
-    return float(np.sqrt(np.var(once) + np.mean(more) ** 2))
+    at = by_loops(whole)
+    once, more = ([by_loops(whole + change) for change in along + times * each] for times in (1.0, 3**0.5))
+    return {
+        figure: float(np.hypot(np.std([one[figure] for one in once]), np.mean([one[figure] for one in more]) - value))
+        for figure, value in at.items()
+    }
 
 
 def own(figure: str) -> Callable[[str], Hand]:
@@ -296,7 +297,7 @@ def diagonals(figure: str) -> Callable[..., Hand]:
         facts = artefact_facts(kind="axis_runs", u_scale_um_per_m=0.0 if how == "no u" else 0.1)
         x = np.array([[np.roll([-1.0, -1.0, 0.0, 1.0, 1.0], turned * (i + way)) for i in range(9)] for way in (0, 2)])
         x[0, -1] += 6.0
-        u = 0.1 if how == "no u" else spread_by_loops(tuple(x.ravel()), 9, figure[0])
+        u = 0.1 if how == "no u" else spread_by_loops(tuple(x.ravel()), 9)[figure[0]]
         stated = changing(0.0 if how == "no u" else 0.05)
         return Hand(AxisRuns(facts, joined(*runs)), stated, {}, 6.0, u, False)
 
@@ -324,25 +325,28 @@ def circular(figure: str, value: float, counter: Floats, clockwise: Floats) -> C
     return made
 
 
-def about_least_squares_centre(path: Floats, angle: Floats) -> Floats:
+def about_least_squares_centre(paths: Floats, angle: Floats) -> Floats:
+    """Of paths (N, t, n), each round by itself."""
     design = np.column_stack([np.ones_like(angle), np.cos(angle), np.sin(angle)])
-    return path - design[:, 1:] @ np.linalg.solve(design.T @ design, design.T @ path)[1:]
+    by_path = np.moveaxis(paths, 1, 0).reshape(len(angle), -1)
+    centres = (design[:, 1:] @ np.linalg.lstsq(design, by_path)[0][1:]).reshape(-1, len(paths), paths.shape[2])
+    return np.asarray(paths - np.moveaxis(centres, 0, 1))
 
 
 def of_circle(figure: str, x: Floats) -> Floats:
-    """The values (one or two) of which a figure is the larger, of paths (2, t, n) about their least-squares centres."""
-    angle, rounds = np.linspace(0, 2 * np.pi, x.shape[1], endpoint=False), range(x.shape[2])
-    off = np.array([[about_least_squares_centre(x[d, :, r], angle) for r in rounds] for d in (0, 1)])
-    if figure == "G":
-        return np.ptp(off, axis=2).max(axis=1)
+    """The values (N, one or two) of which a figure is the larger, of (N, 2, t, n) about their least-squares centres."""
+    angle = np.linspace(0, 2 * np.pi, x.shape[2], endpoint=False)
+    if figure == "G(b)":
+        both = about_least_squares_centre(np.concatenate([x[:, 0], x[:, 1]], axis=1), np.tile(angle, 2))
+        return np.ptp(both, axis=1).max(axis=1)[:, None]
     if figure == "H":
-        return np.array([np.abs(x[0] - x[1]).max()])
+        return np.abs(x[:, 0] - x[:, 1]).max(axis=(1, 2))[:, None]
+    off = np.stack([about_least_squares_centre(x[:, d], angle) for d in (0, 1)], axis=1)
+    if figure == "G":
+        return np.ptp(off, axis=2).max(axis=2)
     if figure == "F":
-        return np.array([off.max(), off.min()])
-    if figure == "D":
-        return np.array([off.mean()])
-    both = [about_least_squares_centre(np.concatenate([x[0, :, r], x[1, :, r]]), np.tile(angle, 2)) for r in rounds]
-    return np.array([max(np.ptp(each) for each in both)])
+        return np.column_stack([off.max(axis=(1, 2, 3)), off.min(axis=(1, 2, 3))])
+    return off.mean(axis=(1, 2, 3))[:, None]
 
 
 @cache
@@ -353,12 +357,10 @@ def spread_of_circle(figure: str, paths: tuple[float, ...], targets: int, rounds
     each = (
         0.05 * 0.5**0.5 * random.standard_t(4, (2000, *x.shape))
     )  # of the standard deviation 0.05 µm, with long tails
-    once, more = (
-        np.array([of_circle(figure, x + change) - of_circle(figure, x) for change in changes + times * each])
-        for times in (1.0, 3**0.5)
-    )
+    (at,) = of_circle(figure, x[None])
+    once, more = (of_circle(figure, x + changes + times * each) - at for times in (1.0, 3**0.5))
     added = np.abs(np.mean(more, axis=0))
-    made = np.abs(of_circle(figure, x) - of_circle(figure, without_scatter(x, float(np.mean(each**2)))))
+    made = np.abs(at - of_circle(figure, without_scatter(x, float(np.mean(each**2)))[None])[0])
     return float(np.sqrt(np.var(once, axis=0) + np.maximum(added, made) ** 2).max())
 
 
