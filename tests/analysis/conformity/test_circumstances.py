@@ -18,6 +18,7 @@ from cmm_uq.analysis.conformity.own_rule import NAME as OWN_RULE
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import NOT_CONVERGED, Statement
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.artefacts.shift.axis import ShiftResult
@@ -321,7 +322,7 @@ def test_a_tolerance_on_what_rests_on_a_size_without_uncertainty_is_no_pass(
         job = re.sub(r"(?m)^effects = .*$", rf"\g<0>\ntolerances = {{ {asked} }}", text)
         job = re.sub(r"(?s)\[\[conformity\]\].*", "", job)
         (tmp_path / "job" / "job.toml").write_text(job, encoding="utf-8")
-        found = {one.name: one for one in cmm_uq.report(tmp_path / "job").outcome.verdicts}
+        found = {one.name: one for one in analyse(tmp_path / "job").verdicts}
         withheld = {
             name for name, one in found.items() if any("given without an uncertainty" in text for text in one.missing)
         }
@@ -349,7 +350,7 @@ def test_thermometers_out_of_calibration_and_the_machine_as_its_own_reference_ma
     rows = (tmp_path / "job" / "ballbar.csv").read_text(encoding="utf-8").splitlines()
     rows = [rows[0] + ",temp_x_c", *(f"{row},20.0" for row in rows[1:])]
     (tmp_path / "job" / "ballbar.csv").write_text("\n".join(rows), encoding="utf-8")
-    found = cmm_uq.report(tmp_path / "job").outcome.verdicts[-1]
+    found = analyse(tmp_path / "job").verdicts[-1]
     assert found.outcome == ("pass" if lack is None else "undecided")
     assert [lack in str(text) for text in found.missing] == ([] if lack is None else [True])
     out_of_order = [str(text) for text in formal_warnings(read_job(tmp_path / "job")) if "Dates out" in text]

@@ -18,7 +18,7 @@ import cmm_uq
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import BrokenPluginError, naming_package, told_with_package
-from tests.app.cli.process import COMMAND
+from tests.app.cli.process import COMMAND, run as run_here
 from tests.app.commands.test_planning import JOB, SIX
 from tests.conftest import ROOT
 from tests.plugin.packages import OUTSIDE_EFFECTS, OUTSIDE_KINDS, OUTSIDE_STANDARDS, describe, install
@@ -134,8 +134,7 @@ coordinate_um = 1.0
 PLUGINS = {"outside-effects": "0.1.0"}
 
 
-def done(site: Path, command: str, *arguments: object) -> None:
-    found = run(site, command, *arguments)
+def done(found: subprocess.CompletedProcess[str]) -> None:
     assert found.returncode == 0, found.stderr
 
 
@@ -145,24 +144,26 @@ def results(folder: Path) -> Any:
 
 @pytest.fixture(scope="module")
 def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Forty placings that tell the twist of the beam, a recording of them, its certificate, and a diagnosis without it."""
+    """Twenty placings that tell the twist of the beam, a recording of them, its certificate, and a diagnosis without it."""
     work = tmp_path_factory.mktemp("outside")
     site, job = work / "site", work / "job"
     for folder in (site, job):
         folder.mkdir()
     install(OUTSIDE_EFFECTS, site)
     named = f'{SIX}, "beam_twist"'
-    text = JOB.format(plan='criterion = "A"\nnumber = 40', effects=named, length=400.0)
+    text = JOB.format(plan='criterion = "A"\nnumber = 20', effects=named, length=400.0)
     (job / "job.toml").write_text(text, encoding="utf-8")
     (work / "truth.toml").write_text(TRUTH, encoding="utf-8")
-    done(site, "plan", job, "--out", work / "plan", "--no-power", "--quiet")
-    shutil.copy(work / "plan" / "plan.csv", job / "recording.csv")
-    done(site, "simulate", job, "--truth", work / "truth.toml", "--out", work / "simulated")
-    done(site, "report", work / "simulated", "--out", work / "report", "--quiet")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.syspath_prepend(site)
+        done(run_here("plan", job, "--out", work / "plan", "--no-power", "--quiet"))
+        shutil.copy(work / "plan" / "plan.csv", job / "recording.csv")
+        done(run_here("simulate", job, "--truth", work / "truth.toml", "--out", work / "simulated"))
+        done(run_here("report", work / "simulated", "--out", work / "report", "--quiet"))
     shutil.copytree(work / "simulated", work / "left-out")
     drawn = (work / "simulated" / "job.toml").read_text(encoding="utf-8")
     (work / "left-out" / "job.toml").write_text(drawn.replace(named, SIX), encoding="utf-8")
-    done(site, "diagnose", work / "left-out", "--out", work / "diagnosis", "--quiet")
+    done(run(site, "diagnose", work / "left-out", "--out", work / "diagnosis", "--quiet"))
     return work
 
 
