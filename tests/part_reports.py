@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
@@ -73,6 +74,12 @@ def unchanged(
 ) -> list[Way]:
     """The measurement as planned alone, for tests that are not about what would change its uncertainty."""
     return [Way(say("as planned"), spread(planned, draws, seed), draws)]
+
+
+def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests that are neither about sampling a machine again nor about what would change a part's uncertainty."""
+    monkeypatch.setattr("cmm_uq.analysis.machine.conditional.sample_sizes", sampled_once)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
 
 
 def found_again_once(job: PartJob, asked: PartOptions, stage: Stage = silent) -> PartMeasurement:

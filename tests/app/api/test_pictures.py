@@ -23,7 +23,7 @@ def found() -> Report:
 
 @pytest.fixture(scope="module")
 def gauge() -> Report:
-    return cmm_uq.report(ROOT / "examples" / "step-gauge-simulated")
+    return cmm_uq.report(ROOT / "examples" / "gauge-blocks-simulated")
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +118,7 @@ def test_the_tables_are_those_of_the_certificate_as_printed(found: Report) -> No
 
 
 def test_units_stand_in_the_headings(gauge: Report) -> None:
-    table = next(frame for name, frame in gauge.tables.items() if name.startswith("All values decided by ISO 10360-2"))
+    table = next(frame for name, frame in gauge.tables.items() if name.startswith("All values decided by VDI/VDE 2617"))
     assert {"Length / mm", "Errors / µm", "U / µm", "Limit / µm"} <= set(table)
 
 

@@ -19,17 +19,14 @@ from cmm_uq.certificate.part.measurement import PartMeasurement
 from tests.app.cli.test_due import recorded, scale
 from tests.conftest import ROOT
 from tests.part_machines import PDF as MACHINE_PDF, by_certificate, plate_of
-from tests.part_reports import put, sampled_once, unchanged
+from tests.part_reports import drawn_once, put
 
 PDF = "part-simulated.pdf"
 TRIALS = 4000  # with fewer, what a forged history changes would be within what computing again allows for the draws
 BRIDGE = {"serial": "", "name": "Simulated bridge machine", "manufacturer": "", "model": "", "place": ""}
 
 
-@pytest.fixture(autouse=True)
-def once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmm_uq.analysis.machine.conditional.sample_sizes", sampled_once)
-    monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
+once = pytest.fixture(autouse=True)(drawn_once)
 
 
 def records(folder: Path) -> Path:

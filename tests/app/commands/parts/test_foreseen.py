@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
@@ -20,13 +21,16 @@ from cmm_uq.certificate.part.budget_section import foreseen_table, foreseen_word
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.jobs.part.job import read_part
 from tests.conftest import ROOT
+from tests.part_reports import drawn_once
 
 PART, CALIBRATION, PLAN = "part-methods-simulated", "bryan-simulated", "plan-step-gauge"
 
 
 @pytest.fixture(scope="module")
-def found() -> PartMeasurement:
-    return evaluate_part(read_part(ROOT / "examples" / PART), PartOptions(trials=20_000))
+def found() -> Iterator[PartMeasurement]:
+    with pytest.MonkeyPatch.context() as patched:
+        drawn_once(patched)
+        yield evaluate_part(read_part(ROOT / "examples" / PART), PartOptions(trials=4000))
 
 
 def test_what_is_undecided_is_told_what_would_bring_its_uncertainty_down(found: PartMeasurement) -> None:
