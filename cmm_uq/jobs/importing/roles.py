@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -223,6 +223,11 @@ def names_length(path: Sequence[str]) -> bool:
 
 def said(path: Sequence[str]) -> Role | None:
     """The role that the words above a column say: that of a mean ahead of what it is of, in Asian words the longest."""
+    return _said(*path)
+
+
+@lru_cache(maxsize=4096)
+def _said(*path: str) -> Role | None:
     texts = [without_unit(text.replace("\n", " "))[0] for text in path]
     names = [hint(text, lengths=True) == LINE for text in texts]  # as ``Line E``, which is no error
     texts = [
