@@ -112,7 +112,7 @@ def _refuse_places_of_lengths(written: Written, table: ExportTable, sign: str) -
     """Places beside which lengths stand that are printed much finer are where those begin, and were not measured."""
     used, headings = {i for own in table.header.columns.values() for i in own}, table.header.headings
     beside = [
-        i for i, head in enumerate(headings) if i not in used and (said([head]) == "measured" or names_length([head]))
+        i for i, head in enumerate(headings) if i not in used and (said(head) == "measured" or names_length([head]))
     ]
     whole = all(np.all(values % 1 == 0) for axis in COORDINATES for values, _, _ in written.get(axis, ()))
     places = [table.cells[k] for axis in COORDINATES for k in table.header.columns.get(axis, ())]

@@ -221,19 +221,12 @@ def names_length(path: Sequence[str]) -> bool:
     return any(word in known or (unspaced(word) and any(one in word for one in parts)) for word in words)
 
 
-def said(path: Sequence[str]) -> Role | None:
+@lru_cache(maxsize=4096)  # thousands of cells have the same words
+def said(*path: str) -> Role | None:
     """The role that the words above a column say: that of a mean ahead of what it is of, in Asian words the longest."""
-    return _said(*path)
-
-
-@lru_cache(maxsize=4096)
-def _said(*path: str) -> Role | None:
     texts = [without_unit(text.replace("\n", " "))[0] for text in path]
-    names = [hint(text, lengths=True) == LINE for text in texts]  # as ``Line E``, which is no error
-    texts = [
-        " ".join(own for own in text.split() if len(own) > 1) if of else text
-        for of, text in zip(names, texts, strict=True)
-    ]
+    # ``Line E`` is no error
+    texts = [" ".join(own for own in t.split() if len(own) > 1) if hint(t, lengths=True) == LINE else t for t in texts]
     words = [word for text in texts for word in plain_words(text)]
     short = [own[-1] for text in texts for part in _ABBREVIATED.findall(text) if (own := plain_words(part))]
     of = words_of("lengths")
@@ -262,7 +255,7 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
         values, steps = grid.column(rows, i)
         if not np.isfinite(values).any():
             continue
-        role = said(path) or ("measured" if any(hint(text, lengths=True) == "run" for text in path) else None)
+        role = said(*path) or ("measured" if any(hint(text, lengths=True) == "run" for text in path) else None)
         unit, name = unit_of(path) or grid.unit_in(rows, i), grid.named(i, path)
         if grid.keys:
             role = _ROLES.get(name, "summary" if name or role in claimed else role)

@@ -68,7 +68,7 @@ def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
                     return candidate
             except CmmUqError:  # two columns of one name
                 return candidate
-            known = (sum(bool(understood(cell).column or said([cell])) for cell in row) for row in rows)
+            known = (sum(bool(understood(cell).column or said(cell)) for cell in row) for row in rows)
             scores[candidate] = max(known, default=0)
     if max(score for candidate, score in scores.items() if candidate != " ") >= _KNOWN:
         scores.pop(" ", None)  # a heading of several words has more of them, cut apart

@@ -22,7 +22,7 @@ _SEVERAL = re.compile(r"(?<![^\s])[+-]?\d+[.,]\d+\s+[+-]?\d+[.,]\d+(?!\S)")
 def below_deviations(grid: CutSheet, rows: Iterable[int]) -> set[int]:
     """Rows below a title that says that they hold deviations, with figures much smaller than those of the rows without it."""
     titles = {row: grid.block_of[row].titles[row].values() for row in rows if row in grid.block_of}
-    counts = {row: sum(said([text]) == "deviation" for text in own) for row, own in titles.items()}
+    counts = {row: sum(said(text) == "deviation" for text in own) for row, own in titles.items()}
     small = {row for row, count in counts.items() if count > min(counts.values())}
     sizes: dict[int, list[float]] = {0: [], 1: []}
     for row in counts:
@@ -91,7 +91,7 @@ def _explained(
         return True
     if row in below_deviations(grid, [row, *rows]):
         return True
-    if said([grid.text(row, k) for k in range(len(cells)) if k not in figures]) == "summary":
+    if said(*(grid.text(row, k) for k in range(len(cells)) if k not in figures)) == "summary":
         return True
     alone = len(figures) < 2 or {*block}.isdisjoint(rows)
     if (alone and {*columns}.isdisjoint(figures)) or grid.other_quantity(row):

@@ -134,7 +134,7 @@ def _certified(grids: Sequence[CutSheet]) -> dict[float, tuple[float, str]]:
         ]
         rows = [row for row, own in enumerate(grid.figures) if any(own)]
         for a, b in pairwise(rows):
-            if (said([grid.text(a, 0)]), said([grid.text(b, 0)])) == ("nominal", "reference"):
+            if (said(grid.text(a, 0)), said(grid.text(b, 0))) == ("nominal", "reference"):
                 both = np.array([[(grid.figure(row, k) or (np.nan,))[0] for k in range(grid.width)] for row in (a, b)])
                 pairs.append((*both[:, np.isfinite(both).all(axis=0)], grid.text(b, 0)))
         for nominal, calibrated, name in pairs:

@@ -212,7 +212,7 @@ def _filled(reading: SheetReading, grid: CutSheet, rows: Sequence[int]) -> Sheet
                 reading.blank.append((row, c.i))
             elif base is None or np.isfinite(reference):
                 reading.add(row, k, c, source, (reference, float(c.values[k])))
-            elif not grid.other_quantity(row) and said([grid.text(row, 0)]) != "summary":
+            elif not grid.other_quantity(row) and said(grid.text(row, 0)) != "summary":
                 raise grid.no_value(row, base.i)
     return reading
 
@@ -308,7 +308,7 @@ def _reference_in_head(grid: CutSheet, rows: Sequence[int], measured: Sequence[F
         within = [(text[: m.start()], figure(m[0], grid.sign)) for text, _ in cells for m in _WITHIN.finditer(text)]
         beside = [(before, own) for (before, _), (_, own) in pairwise(cells)]
         for before, own in (*beside, *within):
-            if own is not None and own[1] < 1 and said([before]) == "reference":
+            if own is not None and own[1] < 1 and said(before) == "reference":
                 values = np.full(len(rows), own[0])
                 if all(like(values, c.values) for c in measured):
                     found[own[0]] = FigureColumn(-1, [before], values, own[1], unit_of([before]), "reference")

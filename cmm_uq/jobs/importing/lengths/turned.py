@@ -64,7 +64,7 @@ def turned(grid: CutSheet) -> Sheet | None:
             texts[len(part.over)] = part.name if several or not any(above) else above[k]
             named = f"{names[0]} {{}}" if names else "({})"
             line = bool(names) and hint(names[0], lengths=True) == LINE and len({*texts[len(part.over) + 1 :]}) > 1
-            plain = [bool(text) and said([text]) is None and not hint(text, lengths=True) for text in texts]
+            plain = [bool(text) and said(text) is None and not hint(text, lengths=True) for text in texts]
             each = zip(texts, plain, strict=True)
             rows.append([named.format(text) if text.isdigit() or (line and bare) else text for text, bare in each])
         own = [sheet.rows[row] for row in (*part.over, *part.rows)]
@@ -76,7 +76,7 @@ def turned(grid: CutSheet) -> Sheet | None:
 
 
 def _named_base(grid: CutSheet, row: int, part: AcrossPart) -> bool:
-    return said([grid.text(row, k) for k in range(part.columns[0])]) in BASES
+    return said(*(grid.text(row, k) for k in range(part.columns[0]))) in BASES
 
 
 def _of(grid: CutSheet, part: AcrossPart, bases: AcrossPart) -> bool:
@@ -113,7 +113,7 @@ def _part(grid: CutSheet, i: int) -> AcrossPart | None:
             if grid.kinds[j] == "text" and over and not part.over:  # over some of them, as names of what is beside are
                 part.beside += [j] if any(grid.text(j, k) for k in range(columns[0])) else []
                 name = grid.text(j, over[0])
-                part.name = name if len(over) == 1 and said([name]) in BASES else ""
+                part.name = name if len(over) == 1 and said(name) in BASES else ""
             break
         part.over.insert(0, j)
     return part if len(part.rows) > 1 else None
