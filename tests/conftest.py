@@ -49,11 +49,15 @@ LONG = (
     "app/commands/test_verify_part.py", "app/commands/test_verify_part_machine.py", "app/commands/test_reissue.py",
     "artefacts/test_contract.py", "test_one_verdict.py", "analysis/parts/test_zones.py", "certificate/test_one_page.py",
     "site/test_site.py", "artefacts/test_certificate_figures.py", "hostile/test_kills_and_collisions.py",
+    "certificate/test_every_layout.py", "jobs/importing/test_unseen_exports.py", "app/commands/parts/test_part.py",
+    "analysis/diagnosis/test_equivalence.py", "analysis/conformity/test_circumstances.py",
+    "analysis/conformity/by_hand/test_by_hand.py", "app/desk/test_exports.py", "analysis/diagnosis/test_doubt.py",
+    "app/api/test_pictures.py", "analysis/conformity/test_grid.py", "app/cli/test_packages.py",
     "artefacts/shift/test_plane.py", "site/test_notebooks.py", "certificate/diagnosis/test_overview.py",
-    "certificate/test_every_layout.py", "hostile/test_kernels.py", "app/commands/test_planning.py",
-    "app/cli/test_packages.py", "certificate/test_compose.py", "app/commands/test_batch.py",
-    "laboratory/schedule/test_cluster.py", "app/commands/test_new.py", "laboratory/records/test_pending.py",
-    "app/commands/test_analysis.py", "app/cli/test_report.py", "analysis/diagnosis/test_diagnosis.py",
+    "hostile/test_kernels.py", "app/commands/test_planning.py", "certificate/test_compose.py",
+    "app/commands/test_batch.py", "laboratory/schedule/test_cluster.py", "app/commands/test_new.py",
+    "laboratory/records/test_pending.py", "app/commands/test_analysis.py", "app/cli/test_report.py",
+    "analysis/diagnosis/test_diagnosis.py",
 )  # fmt: skip
 """Files that take longest, longest first: each runs on one core, so none is to be begun when the others are done."""
 

@@ -20,6 +20,7 @@ from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.certificate.document import Block, Document, Table
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.result import Outcome, Result
+from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 
 SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
@@ -48,6 +49,11 @@ def kept(make: Callable[[str], Document]) -> Callable[[str], Document]:
         return made
 
     return found
+
+
+@cache
+def job_read(job: str) -> Job:
+    return read_job(ROOT / "examples" / job)
 
 
 @cache
@@ -80,7 +86,7 @@ def results(job: str) -> dict[str, Any]:
 
 @kept
 def diagnosed(job: str) -> Document:
-    return diagnosis_outcome(read_job(ROOT / "examples" / job)).document
+    return diagnosis_outcome(job_read(job)).document
 
 
 @kept

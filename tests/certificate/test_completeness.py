@@ -14,7 +14,6 @@ import pytest
 from pydantic import BaseModel
 
 from cmm_uq.app.commands.forms import shipped
-from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.messages import Message, Text, Verbatim
 from cmm_uq.certificate.certificate import conditions
 from cmm_uq.certificate.clauses import claimed, formal_warnings
@@ -22,7 +21,7 @@ from cmm_uq.certificate.document import Document
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.beside import ShortGaugeFacts
 from cmm_uq.jobs.tables.artefact import Traceability
-from tests.artefacts.simulated import document
+from tests.artefacts.simulated import document, job_read
 from tests.certificate.saying import leaves
 from tests.conftest import MACHINE_JOBS, ROOT
 
@@ -44,8 +43,7 @@ def changed(job: Job, /, **tables: dict[str, Any]) -> Job:
 
 def measured(name: str, /, **tables: dict[str, Any]) -> Job:
     """An example as if somebody had measured it."""
-    job = read_job(ROOT / "examples" / name)
-    return changed(changed(job, job={"origin": "measured"}), **tables)
+    return changed(changed(job_read(name), job={"origin": "measured"}), **tables)
 
 
 def missing(job: Job) -> list[str]:
@@ -91,7 +89,7 @@ def test_each_statement_that_is_missing_is_named_with_its_key(name: str, table: 
 
 @pytest.mark.parametrize("name", sorted(CERTIFIED | UNCERTIFIED))
 def test_a_recording_that_nobody_measured_is_asked_for_nothing(name: str) -> None:
-    job = read_job(ROOT / "examples" / name)
+    job = job_read(name)
     assert (formal_warnings(job) == ()) == (job.origin != "measured")
 
 

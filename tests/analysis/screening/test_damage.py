@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cmm_uq.analysis.screening.screening import ScreenedRecording
-from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from tests.artefacts.simulated import job_read
 from tests.recordings import bar_facts, screened, with_columns
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
 REAL = "iota-1102-20C"
 BARS_BODIES_AND_LINES = (
     REAL, "gauge-blocks-simulated", "plate-simulated", "sphere-simulated", "step-gauge-simulated", "triangle-simulated",
@@ -30,7 +28,7 @@ Spoil = Callable[[Floats], None]
 
 
 def recording(example: str) -> tuple[Points, ArtefactFacts]:
-    job = read_job(EXAMPLES / example)
+    job = job_read(example)
     return job.points, job.facts.artefact
 
 
