@@ -137,7 +137,7 @@ def meanings(header: Header) -> dict[int, str]:
 
 def _untaken(heading: str) -> str:
     """Of a column that is not used, whether its heading is understood."""
-    known = not heading or understood(heading.strip()).column or role_said([heading])
+    known = not heading or understood(heading.strip()).column or role_said(heading)
     return IGNORED if known else UNKNOWN
 
 
