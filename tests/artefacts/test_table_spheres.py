@@ -15,6 +15,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from tests.analysis.conformity.by_hand.deciding import decided
 from tests.conftest import ROOT
 from tests.jobs.test_reading import edit
 
@@ -65,9 +66,9 @@ def test_four_axis_errors_are_ranges_of_polar_coordinates_on_the_table(job: Path
 
 
 def outcome(job: Path, figure: str = "FR") -> tuple[str, str]:
-    report = cmm_uq.report(job, seed=1)
-    one = next(each for each in report.results["conformity"] if each["characteristic"] == figure)
-    return one["decision"], " ".join(one["missing"])
+    """What the report states, without estimating the machine for it."""
+    found = decided({path.name: path.read_bytes() for path in job.iterdir()}, figure)
+    return found.outcome, " ".join(map(str, found.missing))
 
 
 def test_the_larger_of_both_spheres_is_decided_against_each_limit(job: Path) -> None:

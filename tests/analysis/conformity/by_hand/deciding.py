@@ -18,15 +18,16 @@ from cmm_uq.base.units import unit
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
-def decided(files: Mapping[str, bytes]) -> Statement:
-    """Read, screened and decided."""
+def decided(files: Mapping[str, bytes], characteristic: str = "") -> Statement:
+    """Read, screened and decided: the first characteristic, or that of a name."""
     job = job_of(files)
+    asked = next(one for one in job.facts.conformity if characteristic in ("", one.characteristic))
     kind, (model, findings) = kind_of(job), screened_model(job)
     made = partial(kind.observing("reported"), job.facts.artefact, where=job.recording_path)
     lengths = model.artefact.lengths()
     value = 0.0 if lengths is None else float(figures(lengths)["b89_range_um"])
     return statement(
-        job.facts.conformity[0], model.artefact,
+        asked, model.artefact,
         {"b89_range_um": Quantity(value, 1.0, (value - 2.0, value + 2.0), unit("µm"))}, "[[conformity]] 1", kind.tested, None,
         job.circumstances, OutsideReadings.of(job.points, findings, made),
     )  # fmt: skip
