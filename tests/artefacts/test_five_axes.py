@@ -14,7 +14,6 @@ from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.app.commands.planning import make_plan
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
 from tests.jobs.test_reading import edit
 
@@ -37,7 +36,7 @@ def test_location_tilt_positioning_and_play_of_both_axes_are_estimated(tmp_path:
         else:
             assert abs(found["value"].iloc[0] - machine[name][0]) < 3.5 * found["u"].iloc[0], name
             assert found["u"].iloc[0] < 2.0, name
-    write_report(tmp_path / "job", tmp_path / "out", seed=1)
+    report.write(tmp_path / "out")
     page = (tmp_path / "out" / "certificate-simulated.html").read_text("utf-8")
     for error in ("EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"):
         assert page.count(f">{error}<") == 1
