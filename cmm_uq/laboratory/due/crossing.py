@@ -30,7 +30,7 @@ _HORIZON = drift.HORIZON * drift.YEAR
 DAYS = np.concatenate([[0.0], np.geomspace(7.0, _HORIZON, 48)])
 # for one, a fortnight each for three years, then a twentieth more
 FINE = np.concatenate([np.arange(0.0, 1120.0, 14.0), np.geomspace(1120.0, _HORIZON, 54)])
-PATHS = 1024
+PATHS = 2048
 _AT_ONCE = 2_000_000
 _GAPS = 15_000  # levels of paths that are moved together: they stay in the cache of a core
 _SEED = 20
