@@ -196,4 +196,9 @@ ROBOT_POSES = Beginning(
     columns={
         f"reference_{axis}_mm": f"Place of the reflector along {axis}, by the reference instrument." for axis in AXES
     },
+    further={
+        f"{of}_{angle}_deg": f"{what} angle {angle} about {axis} of the base; a, b, c turn in this order."
+        for of, what in (("commanded", "Commanded"), ("reference", "Measured"))
+        for angle, axis in zip("abc", AXES, strict=True)
+    },
 )

@@ -217,7 +217,7 @@ class Points:
         _, same = np.unique(np.column_stack([self.measurement, self.point])[others], axis=0, return_inverse=True)
         times = np.bincount(same.ravel())
         off = read - (np.bincount(same.ravel(), read) / times)[same.ravel()]
-        digit = max(1e-9, *(_step(np.unique(of)) for of in both))
+        digit = max(1e-9, *(last_digit(np.unique(of)) for of in both))
         freedoms, equal = int(np.sum(times - 1)), int(np.sum(np.abs(read - certified) <= digit))
         scattered = freedoms > 0 and float(np.sqrt(np.sum(off**2) / freedoms)) > 2 * digit
         return equal if scattered and len(read) >= _SOME and equal >= 0.9 * len(read) else 0
@@ -299,7 +299,7 @@ def _rounded_alike(points: Points) -> set[int]:
         lines[measurement] = lines[measurement] if bare else b""
         lengths.setdefault(measurement, {})[repeat] = length, group
     alone = {measurement: of for measurement, of in lengths.items() if lines[measurement]}
-    step = _step(np.array([length for of in alone.values() for length, _ in of.values()]))
+    step = last_digit(np.array([length for of in alone.values() for length, _ in of.values()]))
     apart = np.array([abs(a - b) for of in alone.values() for (a, _), (b, _) in combinations(of.values(), 2)])
     if not np.any(apart > 0.5 * step):
         return set()
@@ -316,7 +316,7 @@ def _rounded_alike(points: Points) -> set[int]:
     return alike - copies
 
 
-def _step(lengths: Floats) -> float:
+def last_digit(lengths: Floats) -> float:
     """The last digit that lengths (n,), mm, were printed with, mm; of inches as well."""
     for digits in range(9):
         for unit in (1.0, _INCH):

@@ -21,7 +21,9 @@ from cmm_uq.analysis.conformity.statement import Statement, least_favourable
 from cmm_uq.analysis.conformity.uncertainty import (
     FORM_LINES,
     LENGTH_LINES,
+    ORIENTATION_LINES,
     REPEAT_LINES,
+    TURNING_LINES,
     Causes,
     causes_of_lengths,
     length_budget,
@@ -82,7 +84,14 @@ FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
 }  # fmt: skip
 ANGLES = ("angle error", "squareness")
 SIGNED = ("error", "mean error", *ANGLES)
-_UNSTATED = {EVALUATED: "u_coordinate_um", LENGTH_LINES: "u_um", REPEAT_LINES: "u_repeat_um", FORM_LINES: "form_um"}
+_UNSTATED = {
+    EVALUATED: "u_coordinate_um",
+    LENGTH_LINES: "u_um",
+    REPEAT_LINES: "u_repeat_um",
+    FORM_LINES: "form_um",
+    ORIENTATION_LINES: "u_orientation_arcsec",
+    TURNING_LINES: "u_repeat_arcsec",
+}
 
 
 def titled(standard: str) -> Text:
@@ -125,8 +134,8 @@ def figure_decided(
         degrees = REFERENCE_TEMPERATURE if recorded is None else float(recorded[i])
         budget = length_budget(float(found.lengths[i]), float(found.u[i]), degrees, test.circumstances)
     remarks = [_SAID[lines] if worst.u_um > 0 else NOT_STATED]
-    if test.facts.limit_arcsec is not None and worst.length_mm:
-        remarks.append(positioning.as_angle(worst, test.facts.limit_arcsec))
+    if test.facts.angle_arcsec is not None and worst.length_mm:
+        remarks.append(positioning.as_angle(worst, test.facts.angle_arcsec))
     return test.stated(quantity, measured, items, remarks, signed=of_two_sides,
                        causes=causes if len(items) > 1 else None, budget=budget)  # fmt: skip
 
@@ -138,6 +147,8 @@ _SAID = {
         "What the artefact's certificate leaves uncertain cancels; u is what of it changes between readings."
     ),
     FORM_LINES: say("u is half the form deviation of the surface, and what its calibration leaves uncertain."),
+    ORIENTATION_LINES: say("u is that of the measured angle, with alignment to the base."),
+    TURNING_LINES: say("u is what of a measured angle changes between readings."),
 }
 
 
@@ -155,6 +166,10 @@ def _causes(test: Test, found: ArtefactFigure, lines: tuple[str, ...]) -> Causes
     if lines == FORM_LINES:
         u = float(np.hypot(test.artefact.form / MICROMETRE / 2, test.circumstances.uncertainty.u_form_um))
         return Causes(np.full((m, 1), u), np.zeros(m), np.arange(m)).at_least(least)
+    if lines in (ORIENTATION_LINES, TURNING_LINES):
+        u = ARCSECOND * getattr(test.circumstances.uncertainty, _UNSTATED[lines]) / MICROMETRE
+        shared = u * found.lengths if lines == ORIENTATION_LINES else np.zeros(m)
+        return Causes(shared[:, None], u * found.lengths - shared, np.arange(m)).at_least(least)
     changes = np.array([u_of_repeats(float(length), test.circumstances) for length in found.lengths])
     return Causes(np.zeros((m, 0)), changes, np.arange(m)).at_least(least)
 

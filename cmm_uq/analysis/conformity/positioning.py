@@ -119,7 +119,7 @@ def positioning(
         raise test.error(f"{error}: {test.facts.standard} needs every target", fix=fix) from None
     test.refuse_nothing_measured(bool(runs), f"{what} in both directions")
     angular = any(run.angular for run in runs.values())
-    if angular != (test.facts.limit_arcsec is not None):
+    if angular != (test.facts.angle_arcsec is not None):
         kind, keys = ("a rotary axis", "limit_arcsec") if angular else ("no angle", "limit_um or mpe")
         raise test.error(f"{figure} of these runs is of {kind}, and its limit is not", "limit_arcsec", f"Give {keys}")
     moving = {number: run.motion for number, run in runs.items() if run.motion is not None}
@@ -155,7 +155,7 @@ def positioning(
             u=worst.u_um,
         )
     remarks: list[Text] = [how, _CIRCULAR if of is circles else _FORMULAS, *([_IN_MOTION] if moving else [])]
-    remarks += [as_angle(worst, test.facts.limit_arcsec)] if test.facts.limit_arcsec is not None else []
+    remarks += [as_angle(worst, test.facts.angle_arcsec)] if test.facts.angle_arcsec is not None else []
     machine = test.artefact.points.machine
     remarks += _not_measured(runs, machine, angular=angular) if of is axes else []
     items_of = (

@@ -100,7 +100,7 @@ class Standard:
         one = self.characteristic(wish.characteristic)
         if one.lines and one.lines != uncertainty.FORM_LINES and all(stated.declared(line) for line in one.lines):
             return None
-        if one.observed == POSITIONING and wish.limit_arcsec is not None:  # its recording says by what
+        if one.observed == POSITIONING and wish.angle_arcsec is not None:  # its recording says by what
             return None
         if one.needs is None or getattr(stated, one.needs) or stated.u_temperature_k or stated.u_fixturing_um:
             return one.unstated(artefact)
@@ -146,7 +146,7 @@ class Test:
 
     def limits_um(self, lengths_mm: Floats) -> Floats:
         """The limit of each of some lengths (m,), µm: ``limit_um``, an arc, A + L/K, B, or the lesser of these two."""
-        mpe, angle = self.facts.mpe, self.facts.limit_arcsec
+        mpe, angle = self.facts.mpe, self.facts.angle_arcsec
         if angle is not None:
             return np.asarray(angle * ARCSECOND * lengths_mm / MICROMETRE, dtype=np.float64)
         if mpe is None:

@@ -350,8 +350,9 @@ def decidable(
         problem = f"{facts.standard} is for {standard.sensing} probes, and the recording was made with one that is not"
         fix = "State ISO 10360-8:2013 of optical probes, or leave the statement out"
         raise CmmUqError(problem, where=where, fix=fix)
-    if facts.limit_arcsec is not None and not characteristic.angle:
-        raise CmmUqError(f"{characteristic.name} of {facts.standard} is no angle", where=f"job.toml {key} limit_arcsec",
+    if facts.angle_arcsec is not None and not characteristic.angle:
+        where = f"job.toml {key} {'limit_arcsec' if facts.limit_deg is None else 'limit_deg'}"
+        raise CmmUqError(f"{characteristic.name} of {facts.standard} is no angle", where=where,
                          fix="Give limit_um in its place")  # fmt: skip
     return standard, characteristic
 

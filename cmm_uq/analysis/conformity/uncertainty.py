@@ -22,9 +22,11 @@ from cmm_uq.maths.uncertainty.budget import Budget
 
 LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")  # in the order of their budget
 SIZE_LINES, FORM_LINES, REPEAT_LINES = LENGTH_LINES[:3], ("form",), ("repeat",)
+ORIENTATION_LINES, TURNING_LINES = ("orientation",), ("turning",)  # of angles, as arcs over a length
 WARM = 0.5  # K from 20 °C from which on an unknown expansion matters
 # what a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others
 UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
+UNSTATED_RAD = 1e-4  # the same of an angle
 # 1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)
 NORMAL_EXPANSION = 8e-6, 13e-6
 STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6  # 1/K; of what gauges are made of, aluminium expands most
@@ -34,6 +36,8 @@ _NAMES = {
     "temperature": say("temperature of the artefact"), "alignment": say("alignment of the artefact"),
     "fixturing": say("fixturing of the artefact"), "form": say("calibration of the form"),
     "repeat": say("what of the artefact changes between the readings"),
+    "orientation": say("measured angles of orientation, with alignment to the base"),
+    "turning": say("what of measured angles changes between the readings"),
 }  # fmt: skip
 
 
@@ -69,6 +73,8 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
     per_length = {
         "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
         "expansion": away_from_20(artefact) * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
+        "orientation": UNSTATED_RAD,
+        "turning": UNSTATED_RAD,
     }
     missing = {line for line in _acting(lines, artefact) if not _met(line, artefact, under)}
     if "expansion" in lines and not under.cte_per_k and not under.uncertainty.declared("expansion"):

@@ -19,6 +19,7 @@ from cmm_uq.analysis.diagnosis.held_out import numbered_by_place, predicted_fold
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import TrackedFacts
 from cmm_uq.artefacts.optical.pose_noise import PoseNoise, pose_noise, reaches
+from cmm_uq.artefacts.optical.repeated_poses import angle_figures, place_figures, pose_tables, poses_data
 from cmm_uq.artefacts.plate import REFERENCES, Plate, shape_of as shape_of_plate
 from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, D
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
@@ -29,7 +30,7 @@ from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.result import Page, Result
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.machine.model.artefact import ArtefactFigure, Indications, Placings
+from cmm_uq.machine.model.artefact import ArtefactFigure, Indications
 from cmm_uq.machine.model.kind import Beginning
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.joints import OfJoint
@@ -68,25 +69,14 @@ class TrackedPoints(Plate):
         return replace(points, columns={**points.columns, **seen})
 
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
-        """RP of each pose that was commanded again; AP where places are seen in the frame of the base."""
-        points = self.points
-        _, of = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)
-        each = [own for rows in Placings.of(of.ravel()).rows if len(own := rows[counts[rows]]) > 1]
-        if not each:
-            return {}
-        middles = np.array([self.reference[own].mean(axis=0) for own in each])
-        away = [np.linalg.norm(self.reference[own] - middle, axis=1) for own, middle in zip(each, middles, strict=True)]
-        commanded = np.array([points.machine_xyz[own].mean(axis=0) for own in each])
-        rows = np.array([np.resize(own, len(points)) for own in each])
-        names = tuple(say("pose {number}", number=int(points.point[own[0]])) for own in each)
-        lengths = np.linalg.norm(commanded, axis=1)
-        repeated = np.array([one.mean() + 3 * one.std(ddof=1) for one in away])
-        found = {"RP": ArtefactFigure(repeated, rows, lengths, names=names)}
-        if cast("TrackedFacts", self._facts).frame == "base":
-            u = np.full(len(each), self.sizes[0].sd)
-            accuracy = np.linalg.norm(middles - commanded, axis=1)
-            found["AP"] = ArtefactFigure(accuracy, rows, lengths, u, names)
-        return found
+        """RP, RP_a … of each pose that was commanded again; AP, AP_a … where places are seen in the frame of the base."""
+        points, in_base = self.points, cast("TrackedFacts", self._facts).frame == "base"
+        u, own = self.sizes[0].sd if in_base else None, np.broadcast_to(np.eye(3), (len(points), 3, 3))
+        to_base = own if in_base else self.attitudes(points.xyz)
+        return {
+            **place_figures(points, self.reference, counts, u),
+            **angle_figures(points, self.reference, counts, to_base, in_base=in_base),
+        }
 
 
 def joined(machine: Machine) -> TypeGuard[Arm]:
@@ -171,14 +161,7 @@ def results(result: Result) -> dict[str, Any]:
     rows: dict[str, Any] = {}
     if joined(machine):
         rows = {"screws": screws_of(result, machine)} if machine.by_screws else {"rows": rows_of(result, machine)}
-    figures = result.artefact.figures(np.ones(len(points), dtype=bool))
-    poses = [
-        {name: int(getattr(points, name)[own[0]]) for name in ("measurement", "point")}
-        | {"cycles": len(np.unique(own))}
-        | {f"{name}_um": float(of.values[i] / MICROMETRE) for name, of in figures.items()}
-        for i, own in enumerate(figures["RP"].rows if figures else ())
-    ]
-    return {"positions": found, **rows, **({"poses": poses} if poses else {})}
+    return {"positions": found, **rows, **poses_data(points, result.artefact.figures)}
 
 
 _SHARES = ("coordinates_within_U", "points_within_ellipsoid")
@@ -215,22 +198,8 @@ def sections(result: Result) -> list[Section]:
     rows = (
         _rows(data["rows"], result) if "rows" in data else _screws(data["screws"], result) if "screws" in data else None
     )
-    poses = _poses(data["poses"], result) if "poses" in data else None
-    return [section(say("Positions of the tool"), _table(data, result), poses, _arrows(result), rows)]
-
-
-def _poses(poses: list[dict[str, float]], result: Result) -> Table | None:
-    names, finest = [name for name in ("AP", "RP") if f"{name}_um" in poses[0]], result.noise.expanded / 10
-    rows = (
-        (number(one["point"]), number(one["cycles"]), *(rounded(one[f"{name}_um"], finest)[0] for name in names))
-        for one in poses
-    )
-    note = say(
-        "RP: mean distance from the barycentre of all cycles and three standard deviations. AP: distance of the barycentre "
-        "from the commanded place, where the reference instrument's places are in the frame of the base (ISO 9283)."
-    )
-    values = figure_columns(*map(Verbatim, names), unit=unit("µm"))
-    return table(say("Pose accuracy and repeatability"), [say("Pose"), say("Cycles"), *values], rows, note)
+    poses = pose_tables(data, result.noise.expanded / 10)
+    return [section(say("Positions of the tool"), _table(data, result), *poses, _arrows(result), rows)]
 
 
 _WHEN: Mapping[str, Text] = {

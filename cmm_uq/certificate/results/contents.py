@@ -331,7 +331,7 @@ def statement_data(statement: Statement) -> dict[str, Any]:
         "missing": list(statement.missing_with_remedies), "remarks": list(statement.remarks),
         "probability_all_conform": statement.joint,
         "mpe": None if statement.facts.mpe is None else statement.facts.mpe.model_dump(),
-        **({} if statement.facts.limit_arcsec is None else {"limit_arcsec": statement.facts.limit_arcsec}),
+        **({} if (angle := statement.facts.angle_arcsec) is None else {"limit_arcsec": angle}),
         "prior": None if statement.facts.prior is None else statement.facts.prior.model_dump(),
         "global_risks": statement.risks and attributes(statement.risks, "consumer", "producer"),
         "test_uncertainty": None if statement.budget is None else budget_data(statement.budget),

@@ -105,6 +105,8 @@ def named(statement: Statement) -> Text:
 
 def formula(facts: ConformityFacts) -> Text:
     """The maximum permissible error as the job states it; L in mm, the result in µm."""
+    if facts.limit_deg is not None:
+        return say("{limit}°", limit=limit_in_full(facts.limit_deg))
     if facts.limit_arcsec is not None:
         return say("{limit} ″", limit=limit_in_full(facts.limit_arcsec))
     return say("{limit} µm", limit=limit_in_full(facts.limit_um or 0.0)) if facts.mpe is None else mpe_words(facts.mpe)
@@ -122,12 +124,12 @@ def mpe_words(mpe: MaximumPermissibleError) -> Text:
 def _limit(statement: Statement) -> Text:
     facts, length = statement.facts, statement.named.length_mm
     here = say("{limit} µm", limit=limit_in_full(statement.limit_um))
-    if facts.mpe is None and facts.limit_arcsec is None:
+    if facts.mpe is None and facts.angle_arcsec is None:
         return here
     if length is not None:
         here = say("{limit} at L = {length} mm", limit=here, length=nominal(length))
     by = say("{here}; {formula}", here=here, formula=formula(facts))
-    return say("{here}; MPE = {formula}", here=here, formula=formula(facts)) if facts.limit_arcsec is None else by
+    return say("{here}; MPE = {formula}", here=here, formula=formula(facts)) if facts.angle_arcsec is None else by
 
 
 def _what_follows(statement: Statement) -> list[Text]:

@@ -191,8 +191,8 @@ def check_job(inquiry: Inquiry, job: Job, data: Mapping[str, Any], file: str) ->
             wished["characteristic"] = wish.characteristic
         if wish.limit_um is not None:
             wished["limit_um"] = float(f"{wish.limit_um:.10g}")
-        if wish.limit_arcsec is not None or "limit_arcsec" in entry:
-            wished["limit_arcsec"] = wish.limit_arcsec and float(f"{wish.limit_arcsec:.10g}")
+        if wish.angle_arcsec is not None or "limit_arcsec" in entry:
+            wished["limit_arcsec"] = wish.angle_arcsec and float(f"{wish.angle_arcsec:.10g}")
         stated += [(f"conformity[{i}].{key}", entry.get(key), should) for key, should in wished.items()]
     for place, stands, should in stated:
         inquiry.compare("inputs", file, place, f"is not what {JOB} says", stands, should)

@@ -108,6 +108,8 @@ class NegligibleLines(JobTable):
     fixturing: Declared | None = key(None, "Fixturing of the artefact.")
     form: Declared | None = key(None, "Calibration of the form deviation of a test sphere.")
     repeat: Declared | None = key(None, "What of the artefact changes between repeated readings.")
+    orientation: Declared | None = key(None, "Measured angles of orientation.")
+    turning: Declared | None = key(None, "What of measured angles of orientation changes between readings.")
 
 
 class TestUncertainty(JobTable):
@@ -126,7 +128,11 @@ class TestUncertainty(JobTable):
     """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between."""
     u_alignment_arcsec: Uncertainty = 0.0
     """Of angles of a rotary axis: standard uncertainty at each target by how polygon and autocollimator are aligned."""
-    u_repeat_arcsec: Uncertainty = key(0.0, "Of angles of a rotary axis: what changes between readings.")
+    u_orientation_arcsec: Uncertainty = 0.0
+    """Standard uncertainty of an angle of orientation by the reference instrument, alignment to the base included."""
+    u_repeat_arcsec: Uncertainty = key(
+        0.0, "Of angles of a rotary axis, or of orientation: what changes between readings."
+    )
     negligible: NegligibleLines = key(NegligibleLines(), "Lines that are declared negligible, by whom and why.")
     machine: MachineLines = key(MachineLines(), "Lines that are declared the machine's own, by whom and why.")
 
@@ -152,6 +158,7 @@ ANGULAR_KEYS = {"alignment": "u_alignment_arcsec", "repeat": "u_repeat_arcsec"} 
 LINE_KEYS = {
     "expansion": "u_cte_per_k", "temperature": "u_temperature_k", "alignment": "u_alignment_um",
     "fixturing": "u_fixturing_um", "form": "u_form_um", "repeat": "u_repeat_um",
+    "orientation": "u_orientation_arcsec", "turning": "u_repeat_arcsec",
 }  # fmt: skip
 TEST_KEYS = tuple(LINE_KEYS.values())
 
@@ -264,6 +271,7 @@ class ConformityFacts(JobTable):
     own rule: span, error, flatness …; the first where it is left out."""
     limit_um: Limit | None = key(None, "Limit of the quantity.")
     limit_arcsec: Positive | None = key(None, "Limit of a figure that is an angle, decided as an arc over its length.")
+    limit_deg: Positive | None = key(None, "The same in degrees: `0.05`, or 3 arcminutes.")
     mpe: Permissible | None = None
     """Maximum permissible error: `"3 + L/300"` (L in mm, the error in µm), or a table of `a_um`, `k`, `b_um`."""
     rule: Rule = key("ISO 14253-1", "Decision rule, by name or by its figure.")
@@ -296,9 +304,17 @@ class ConformityFacts(JobTable):
                 )
         return data
 
+    @property
+    def angle_arcsec(self) -> float | None:
+        """The limit of an angle, in whichever unit it is stated."""
+        return self.limit_arcsec if self.limit_deg is None else 3600 * self.limit_deg
+
     def problems(self) -> Iterator[str]:
-        if sum(limit is not None for limit in (self.limit_um, self.limit_arcsec, self.mpe)) != 1:
-            yield 'give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm, or of an angle limit_arcsec'
+        if sum(limit is not None for limit in (self.limit_um, self.limit_arcsec, self.limit_deg, self.mpe)) != 1:
+            yield (
+                'give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm, or of an angle limit_arcsec or '
+                "limit_deg"
+            )
         if needs_prior(self.rule) and self.prior is None:
             yield (
                 f"the rule {_key_of(self.rule)} goes by what is known of such machines beforehand: "

@@ -228,6 +228,47 @@ def commanded(figure: str) -> Callable[[str], Made]:
     return made
 
 
+TURNED = np.array([10.0, 20.0, -30.0])
+"""°: a, b, c of all poses, as commanded."""
+PER_ARCSECOND = 1e6 / 3600 * np.pi / 180
+"""µm of an arc over a metre."""
+
+
+def oriented_poses(figure: str) -> Callable[[str], Made]:
+    """As :func:`commanded`, of angles: the third pose is 9″, −14″ or 20″ off and strays by 4″ 22 times, 1″ eight times."""
+    k = "abc".index(figure[-1])
+
+    def made(how: str) -> Made:
+        rows, seen, angles = [], [], []
+        for cycle in range(1, 30 + (how != "incomplete")):
+            for pose in range(1, 6):
+                at = np.array([500.0, 100.0, 700.0]) + CORNERS[pose - 1]
+                rows.append((1, pose, cycle, at))
+                seen.append(at + UM * cycle * X)
+                away = 0.2 if pose != 3 else 4.0 if cycle <= 22 else 1.0
+                off = OFF_ARCSEC * (pose == 3) + away * (-1) ** cycle + 1e-4 * cycle
+                angles.append(TURNED + off / 3600)
+        named = {f"reference_{a}_mm": np.array(seen)[:, i] for i, a in enumerate("xyz")}
+        for i, a in enumerate("abc"):
+            named |= {f"reference_{a}_deg": np.array(angles)[:, i], f"commanded_{a}_deg": np.full(len(rows), TURNED[i])}
+        points = recorded(rows, **named)
+        if how == "copied":
+            points = copied(points, (1, 30), (1, 28))
+        facts = artefact_facts(kind="tracked_points", frame="base", u_um=0.5)
+        cycles = 30 - (how in ("incomplete", "copied"))
+        each = [(4.0 if cycle <= 22 else 1.0) * (-1) ** cycle + 1e-4 * cycle for cycle in range(1, cycles + 1)]
+        mean = sum(each) / cycles
+        key = "u_orientation_arcsec" if figure.startswith("AP") else "u_repeat_arcsec"
+        u = {} if how == "no u" else {key: 0.02}
+        under = replace(STATED, uncertainty=TestUncertainty(negligible=NEGLIGIBLE, **u))
+        spread = 3 * (sum((one - mean) ** 2 for one in each) / (cycles - 1)) ** 0.5
+        value = OFF_ARCSEC[k] + mean if figure.startswith("AP") else spread
+        return TrackedPoints(facts, points), under, value * PER_ARCSECOND, 0.02 * PER_ARCSECOND, figure.startswith("AP")
+
+    return made
+
+
+OFF_ARCSEC = np.array([9.0, -14.0, 20.0])
 ARMS: dict[tuple[str, str], Callable[[str], Made]] = {
     ("ISO 10360-12:2016", "P_Form.Sph.1x25::Tact.AArm"): probed(size=False),
     ("ISO 10360-12:2016", "P_Size.Sph.1x25::Tact.AArm"): probed(size=True),
@@ -241,4 +282,5 @@ ARMS: dict[tuple[str, str], Callable[[str], Made]] = {
     ("ASME B89.4.22-2004", "SPAT maximum"): seats("largest"),
     ("ISO 9283:1998", "AP"): commanded("AP"),
     ("ISO 9283:1998", "RP"): commanded("RP"),
+    **{("ISO 9283:1998", f"{of}_{angle}"): oriented_poses(f"{of}_{angle}") for of in ("RP", "AP") for angle in "abc"},
 }

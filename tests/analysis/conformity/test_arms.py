@@ -39,12 +39,13 @@ def test_the_smallest_sphere_holds_all_points_and_none_is_smaller(count: int) ->
 
 def minimum(points: np.ndarray) -> np.ndarray:
     """Centre of the smallest sphere by another way: the least bound, by sequential quadratic programming."""
-    start = np.append(points.mean(axis=0), 10.0)
+    middle, size = points.mean(axis=0), float(np.ptp(points, axis=0).max(initial=0.0)) or 1.0
+    points = (points - middle) / size  # near the origin and of unit size, for steps of the search are
+    start = np.append(np.zeros(3), 1.0)
     rows = {"type": "ineq", "fun": lambda x: x[3] - np.sum((points - x[:3]) ** 2, axis=1)}
     start[3] = float(np.sum((points - start[:3]) ** 2, axis=1).max())
-    return np.asarray(
-        minimize(lambda x: x[3], start, constraints=[rows], method="SLSQP", options={"ftol": 1e-14}).x[:3]
-    )
+    found = minimize(lambda x: x[3], start, constraints=[rows], method="SLSQP", options={"ftol": 1e-14, "maxiter": 500})
+    return np.asarray(middle + size * found.x[:3])
 
 
 def test_the_sphere_about_a_tetrahedron_goes_through_its_corners_and_one_about_two_points_is_as_wide_as_they_are() -> (

@@ -44,7 +44,7 @@ TURNS: dict[str, tuple[Rule, list[tuple[float, str]]]] = {
 
 CASES = [(*test, rule) for test, rule in itertools.product(TESTS, TURNS)]
 AGAIN = {"E0", "E150"}
-OF_ARMS = ("L_Dia", "SPAT", "SPAT maximum", "AP", "RP")
+OF_ARMS = ("L_Dia", "SPAT", "SPAT maximum", "AP", "RP", "AP_a", "AP_b", "AP_c", "RP_a", "RP_b", "RP_c")
 
 
 def expected(rule: str, room: float) -> str:
@@ -123,7 +123,7 @@ def test_without_an_uncertainty_only_simple_acceptance_decides(standard: str, ch
         pytest.skip("its u is that of the evaluation, which always has one")
     hand = by_hand(standard, characteristic, "no u")
     if rule != "simple":
-        keys = "u_um|u_blocks_um( and u_cylinders_um)?|u_repeat_um|form_um|u_scale_um_per_m|u_bar_um"
+        keys = "u_um|u_blocks_um( and u_cylinders_um)?|u_repeat_um|form_um|u_scale_um_per_m|u_bar_um|u_[a-z]*_arcsec"
         states_none = rf"needs the uncertainty.*states no ({keys}) above 0"
         with pytest.raises(CmmUqError, match=states_none):
             judged(hand, standard, characteristic, rule, 10.0)

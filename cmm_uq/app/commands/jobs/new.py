@@ -323,7 +323,7 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
         whole[table] = [merged] if listed else merged
     if "U_um" in given.get("artefact", {}):
         whole["artefact"].pop("u_um", None)
-    limits, stated = {"limit_um", "limit_arcsec", "mpe"}, {key.partition(".")[0] for key in conformity}
+    limits, stated = {"limit_um", "limit_arcsec", "limit_deg", "mpe"}, {key.partition(".")[0] for key in conformity}
     for other in limits - stated if limits & stated else ():
         whole["conformity"][0].pop(other, None)
     return whole
