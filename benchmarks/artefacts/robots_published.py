@@ -15,11 +15,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtri
 
 from benchmarks.artefacts.arm_coverage import NAMED
 from cmm_uq.app.commands.model import model_of
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.artefacts import artefact_of
+from cmm_uq.artefacts.optical.corrected_poses import corrected_poses
 from cmm_uq.artefacts.optical.tracked import TrackedPoints, predicted_poses
 from cmm_uq.machine.physics.stated import physics_of
 
@@ -159,6 +161,24 @@ def shown(name: str, folder: Path) -> str:
     return f"| {name} | {len(before)} | {rank} | {figures} | {share(predicted.within, xyz)} | {share(predicted.inside, xyz)} |"
 
 
+def corrected(name: str, folder: Path) -> str:
+    """Every second pose fitted, places of the others by ``compensate --poses`` against where they were seen."""
+    files = job_files(ROBOTS[name](folder))
+    text = files["job.toml"].replace(b'"tracked_points"', b'"tracked_points"\nframe = "base"')
+    lines = files["recording.csv"].splitlines(keepends=True)
+    job = job_of({"job.toml": text, "recording.csv": b"".join([lines[0], *lines[1::2]])})
+    further = job_of({"job.toml": text, "recording.csv": b"".join([lines[0], *lines[2::2]])}).points
+    with physics_of(job):
+        found = corrected_poses(model_of(job, artefact_of(job.facts.artefact, job.points)), further)
+    off = found.xyz - np.column_stack([further.columns[f"reference_{axis}_mm"] for axis in "xyz"])
+    squares = np.einsum("ni,ni->n", off, np.linalg.solve(found.covariance, off[:, :, None])[:, :, 0])
+    away, within = 1000 * np.linalg.norm(off, axis=1), np.abs(off) <= found.coverage_factor * found.u
+    inside = squares <= 3 * fdtri(3, found.degrees, 0.95)
+    held = f"{share(within, further.xyz)} | {share(inside, further.xyz)}"
+    return f"| {name} | {len(job.points)} | {len(further)} | {away.mean():.0f}, {away.max():.0f} | {held} |"
+
+
 if __name__ == "__main__":
-    for robot in sys.argv[2:] or ROBOTS:
-        print(shown(robot, Path(sys.argv[1])), flush=True)
+    study = corrected if sys.argv[2:3] == ["corrected"] else shown
+    for robot in sys.argv[3 if study is corrected else 2 :] or ROBOTS:
+        print(study(robot, Path(sys.argv[1])), flush=True)

@@ -35,6 +35,10 @@ _STANDARD, _MODIFIED = (THETA, D, A, ALPHA, BETA), (ALPHA, A, BETA, THETA, D)
 _ALONG = {A: 0, ALPHA: 0, BETA: 1, D: 2, THETA: 2}
 
 
+_ROUNDS, _SETTLED, _DIGITS = 30, 1e-9, 7  # mm; of readings, with which a recording prints them whole
+_SINGULAR = 1e-6  # part of the joints' largest motion of the tool, below which a direction is none
+
+
 @dataclass(frozen=True, eq=False)
 class ArmPose:
     """A chain of j joints at n sets of readings, in the frame of its base."""
@@ -100,6 +104,29 @@ class Arm(Machine):
     def coordinates(self, readings: Floats) -> Floats:
         own = readings[:, -len(self.rows) :]
         return self.at(own).tool - self.origin_mm if self.joints else super().coordinates(readings)
+
+    def columns_at(self, xyz: Floats, columns: Mapping[str, Floats]) -> Mapping[str, Floats]:
+        """With the readings next to the recorded ones by which the rows have the tool at these coordinates."""
+        if not self.joints:
+            return columns
+        which = 5 * np.arange(len(self.rows)) + np.where(self.revolute, THETA, D)
+        units = self.sense * np.where(self.revolute, np.pi / 180, 1.0)
+        moved: dict[str, Floats] = {}
+        for _ in range(_ROUNDS):
+            pose = self.posed(columns)
+            off = xyz + self.origin_mm - pose.tool
+            if not np.abs(off).max(initial=0.0) > _SETTLED:
+                return {**columns, **{name: np.round(columns[name], _DIGITS) for name in moved}}
+            step = np.einsum("nji,ni->nj", np.linalg.pinv(pose.jacobian[:, :, which], rcond=_SINGULAR), off) / units
+            moved = {name: columns[name] + step[:, i] for i, name in enumerate(self.columns_of_joints)}
+            columns = {**columns, **moved}
+        row = int(np.argmax(np.linalg.norm(off, axis=1)))
+        place = ", ".join(f"{value:.3f}" for value in xyz[row])
+        raise CmmUqError(
+            f"no readings of the joints bring the tool to {place}",
+            where="the simulated recording",
+            fix="Plan poses farther from where the arm is stretched out, or smaller errors",
+        )
 
     def limits_of(self, axis: str) -> tuple[Floats, str, str]:
         if axis in AXES:

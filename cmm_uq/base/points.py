@@ -80,6 +80,10 @@ class Machine:
     def as_recorded(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
         return xyz
 
+    def columns_at(self, xyz: Floats, columns: Mapping[str, Floats]) -> Mapping[str, Floats]:
+        """Columns of a recording with these coordinates (n, 3): what does not follow from them is as it was."""
+        return columns
+
     def columns_as_recorded(self, columns: Mapping[str, Floats]) -> Mapping[str, Floats]:
         """Columns as in the recording, of those along the axes of the coordinates."""
         return columns

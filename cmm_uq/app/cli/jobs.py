@@ -342,7 +342,7 @@ def simulate(
 
 
 def compensate(
-    job: Path = job_folder(..., "Job folder with [machine] error_map, or rotary_errors."),
+    job: Path = job_folder(..., "Job folder with [machine] error_map, or rotary_errors; of a robot with --poses."),
     out: Path = option(..., "Folder for the compensated job.", "DIR"),
     extrapolate: bool = option(False, "Extrapolate beyond the maps, and flag those points."),
     map_text: float | None = option(
@@ -350,6 +350,8 @@ def compensate(
     cloud: Path | None = option(
         None, "Cloud of a digitizer, or of rotary axes, to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
         "the job's recording"),
+    poses: Path | None = option(
+        None, "Poses of a robot to correct instead by its recording: .csv of q1_deg, q2_deg …", "FILE", "none"),
     new_map: bool = option(
         False, "Write instead an error map of all errors that the job's recording shows; with rotary axes a file of them."),
     controller: str = option(
@@ -357,12 +359,22 @@ def compensate(
         "is a jinja2 template of your own.", "FORM", "not written"),
     end: Ending = opt.FORCED,
 ) -> None:  # fmt: skip
-    """Correct a recording by its machine's error maps, as a job folder of its own, or make a map or tables of one."""
+    """Correct a recording by its machine's error maps, as a job folder of its own, or a robot's poses; or make maps of one."""
     from cmm_uq.analysis.machine.correction import FieldMap
     from cmm_uq.app.commands.jobs import compensate as corrected, controller as tables
     from cmm_uq.machine.physics.map_interpolation import Beyond
 
     beyond: Beyond = "extrapolate" if extrapolate else "refuse"
+    if poses is not None:
+        if new_map or controller or cloud is not None or map_text is not None or extrapolate:
+            problem = "--poses goes with none of --new-map, --controller, --cloud, --map-text and --extrapolate"
+            raise CmmUqError(problem, fix="Leave out one of them")
+        from cmm_uq.app.commands.jobs.compensate_poses import write_corrected_poses
+
+        with end.progress() as stage:
+            files, said = write_corrected_poses(job, poses, out, force=end.force, stage=stage)
+        conclude_derived(files, f"{poses.name}, corrected by the recording of {job}", end, is_job=False, remarks=said)
+        return
     if new_map:
         if cloud is not None or map_text is not None or extrapolate:
             problem = "--new-map makes a map, and goes with none of --cloud, --map-text and --extrapolate"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from cmm_uq.analysis.conformity.uncertainty import unknown_expansion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, holding, listed, number, say, sentences
 from cmm_uq.certificate.diagnosis.overview import VERDICT_SENTENCES
@@ -13,6 +15,7 @@ from cmm_uq.certificate.wording import stated_physics, title_of, with_uncertaint
 from cmm_uq.machine.model.artefact import without_uncertainty
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT, IMPLAUSIBLE
+from cmm_uq.machine.model.noise import repeated_quantity
 from cmm_uq.maths.inference.ensembles import Chains
 from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import alike, figure, nominal, significant
@@ -21,8 +24,11 @@ _SHOWN = 0.8  # probability from which a component is said to be there; beforeha
 _WIDER = 1.05
 
 
-def noise_found(noise: RecordingNoise, *, heavy_tails: bool) -> Text:
-    """What was found, could not show, and does to the uncertainties; ``heavy_tails`` by the diagnosis, not the estimate."""
+def noise_found(noise: RecordingNoise, *, heavy_tails: bool, repeats: bool = False) -> Text:
+    """What was found, could not show, and does to the uncertainties.
+
+    ``heavy_tails``: by the diagnosis, not the estimate; ``repeats``: whether anything was repeated.
+    """
     there = _components(noise)
     if heavy_tails:
         there.append(say("heavier tails than those of the normal distribution that the estimate assumes"))
@@ -32,7 +38,10 @@ def noise_found(noise: RecordingNoise, *, heavy_tails: bool) -> Text:
     if noise.wider >= _WIDER:
         found = say("{found}; standard uncertainties are up to {times:.2f} times those under white noise",
                     found=found, times=noise.wider)  # fmt: skip
-    hidden = [] if "placing" in noise.components else [say("set-up offsets (no repeats)")]
+    unseen = (
+        say("set-up offsets (one with where the artefact stands)") if repeats else say("set-up offsets (no repeats)")
+    )
+    hidden = [] if "placing" in noise.components else [unseen]
     drifted = "slow" in noise.components
     hidden.append(say("what had drifted before the first reading") if drifted else say("slow noise (no times)"))
     return say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden))
@@ -98,7 +107,10 @@ def method(result: Result) -> Section:
         (say("Residual standard deviation"),
          NOTHING if ls.residual_sd is None else say("{sd} µm", sd=alike(ls.residual_sd * 1e3)[0])),
         (say("Standard uncertainty of a coordinate"), spread),
-        (say("Noise"), noise_found(noise, heavy_tails=result.diagnosed.diagnosis.noise.heavy_tails)),
+        (say("Noise"), noise_found(
+            noise, heavy_tails=result.diagnosed.diagnosis.noise.heavy_tails,
+            repeats=bool(np.any(np.bincount(repeated_quantity(result.model, result.model.used)) > 1)),
+        )),
         (say("Sampler"), say("{sampler}, seed {seed}, {count} draws", sampler=Verbatim(posterior.sampler),
                              seed=posterior.seed, count=len(posterior.draws))),
         (say("Convergence"), say(

@@ -202,7 +202,7 @@ class Artefact(ABC):
 
     def recorded(self, points: Points, xyz: Floats) -> Points:
         """A recording ``points`` of it as it would be with the artefact's points indicated at ``xyz``, mm."""
-        return points.at(xyz)
+        return replace(points, xyz=xyz, columns=points.machine.columns_at(xyz, points.columns))
 
     def tips(self) -> Mapping[str, Floats]:
         """Offset of what measures from the mount, mm, at each point of the recording, where it is known: columns by name."""

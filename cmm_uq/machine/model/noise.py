@@ -8,6 +8,7 @@ import scipy
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.recorded import Display, display_step, distances_in_placing
+from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.noise import AXES, FEWER, FREQUENCIES, GROWTH, PLACING, SLOW, Components
 
 # part of the observations' variance that each of two axes must have for their noises to be told apart
@@ -18,6 +19,7 @@ _WHOLE = 100  # repeats whose mean and contrasts are one matrix without zeros; o
 # longest over median length from which on noise may be seen to grow with it. Of three by three places, seen from a corner,
 # they are 1.41, of four by four 1.5: the last digits of a recording decide of neither.
 _LEAST_SPREAD = 1.45
+_LEAST_OFFSET = 1e-9  # part of an offset that is no rounding of where the artefact stands
 _NO_LENGTH = 1e-3  # part of the longest length that is none
 
 
@@ -57,13 +59,24 @@ def noise_of(
         )
     parts, longer = axes / axes.sum(axis=1, keepdims=True), length[length > _NO_LENGTH * length.max(initial=0.0)]
     possible = {
-        AXES: bool(np.sum(np.ptp(parts, axis=0) > _LEAST_SHARE) >= 2), PLACING: bool(np.any(np.bincount(block) > 1)),
+        AXES: bool(np.sum(np.ptp(parts, axis=0) > _LEAST_SHARE) >= 2), PLACING: _shows(model, xyz, chosen, block),
         GROWTH: bool(len(longer)) and bool(longer.max() > _LEAST_SPREAD * np.median(longer)), SLOW: slow.shape[1] > 0,
     }  # fmt: skip
     return Components(
         turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step,
         part,
     )  # fmt: skip
+
+
+def _shows(model: RecordingModel, xyz: Floats, chosen: np.ndarray, block: Ints) -> bool:
+    """Whether an offset that repeats of a quantity share is more than where the artefact stands, which is free."""
+    several = np.bincount(block) > 1
+    offsets = np.where(several, np.random.default_rng(0).standard_normal(len(several)), 0.0)[block]
+    reached, left = Freedoms.of(model.artefact.placing(xyz)).at(chosen).reached, offsets.copy()
+    for rows in reached.rows:
+        columns = reached.columns[rows]
+        left[rows] -= columns @ (columns.T @ offsets[rows])
+    return bool(np.linalg.norm(left) > _LEAST_OFFSET * np.linalg.norm(offsets))
 
 
 def display_of(model: RecordingModel) -> Display | None:
