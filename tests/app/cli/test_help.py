@@ -42,7 +42,7 @@ def test_a_help_shows_every_sentence_as_it_is_written_and_ends_with_calls(name: 
 
 
 def test_brackets_of_toml_are_not_taken_for_markup() -> None:
-    assert "Job folder with [machine] error_map." in helped("compensate")
+    assert "Job folder with [machine] error_map, " in helped("compensate")
 
 
 def test_the_list_of_commands_is_not_cut() -> None:
