@@ -357,8 +357,7 @@ _TRACKED = f"{_HERE}.optical.tracked"
 TRACKED_POINTS = Kind(
     "tracked_points", TrackedFacts, f"{_TRACKED}:TrackedPoints", f"{_TRACKED}:SCREENING",
     f"{_HERE}.optical.poses:PLANNING", f"{_TRACKED}:PAGE", f"{_TRACKED}:BEGIN",
-    begin_also=_also("robot_poses"),
-    tested=("AP", "RP", *(f"{of}_{angle}" for of in ("AP", "RP") for angle in "abc")),
+    begin_also=_also("robot_poses"), tested=("AP", "RP", *(f"{of}_{angle}" for of in ("AP", "RP") for angle in "abc")),
 )  # fmt: skip
 
 

@@ -184,7 +184,7 @@ class Arm(Machine):
         return _MODIFIED if self.modified else _STANDARD
 
 
-_PARALLEL = np.cos(np.radians(5.0))  # from which on the common normal of two axes says little of where it is
+PARALLEL = np.cos(np.radians(5.0))  # from which on the common normal of two axes says little of where it is
 
 
 def rows_of_screws(directions: Floats, through: Floats, revolute: NDArray[np.bool_], home: Floats) -> dict[str, Floats]:
@@ -204,7 +204,7 @@ def rows_of_screws(directions: Floats, through: Floats, revolute: NDArray[np.boo
     for i, (direction, point) in enumerate(zip(directions[1:], through[1:], strict=True)):
         axis = frame[:3, :3].T @ direction
         at = frame[:3, :3].T @ (point - frame[:3, 3]) if revolute[i + 1] else np.zeros(3)  # a shift has no place
-        rows[i] = _to_parallel(axis, at) if abs(axis[2]) > _PARALLEL else _to_crossing(axis, at)
+        rows[i] = _to_parallel(axis, at) if abs(axis[2]) > PARALLEL else _to_crossing(axis, at)
         frame = frame @ _motion(rows[i])
     last = np.linalg.inv(frame) @ home
     rows[-1, ALPHA] = np.arcsin(np.clip(last[2, 1], -1.0, 1.0))  # Rz(θ) Rx(α) Ry(β)

@@ -21,9 +21,7 @@ from cmm_uq.analysis.conformity.statement import Statement, least_favourable
 from cmm_uq.analysis.conformity.uncertainty import (
     FORM_LINES,
     LENGTH_LINES,
-    ORIENTATION_LINES,
     REPEAT_LINES,
-    TURNING_LINES,
     Causes,
     causes_of_lengths,
     length_budget,
@@ -40,6 +38,7 @@ from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Indications
 NAME = positioning.OWN_RULE
 # lines of a figure whose u is that of its evaluation, with all that is stated of the readings
 EVALUATED: tuple[str, ...] = ()
+ORIENTATION_LINES, TURNING_LINES = ("orientation",), ("turning",)  # of angles, as arcs over a length
 # each figure: what is compared, what is counted of it, and the lines of its uncertainty
 FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
     "error": (say("error of length, worst against its limit"), say("lengths"), LENGTH_LINES),

@@ -9,15 +9,14 @@ from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
-from scipy.stats import poisson
 
 from cmm_uq.analysis.conformity import own_rule
 from cmm_uq.analysis.conformity.arms import asked
+from cmm_uq.analysis.conformity.own_rule import ORIENTATION_LINES, TURNING_LINES
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, length_unstated
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Statement
-from cmm_uq.analysis.conformity.uncertainty import LENGTH_LINES, ORIENTATION_LINES, REPEAT_LINES, TURNING_LINES
+from cmm_uq.analysis.conformity.uncertainty import LENGTH_LINES, REPEAT_LINES
 from cmm_uq.base.arm import Arm
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Points, last_digit
@@ -71,11 +70,14 @@ def copied(points: Points, *, angles: bool = False) -> dict[int, int]:
         pairs += comb(len(rows), 2)
     if not found:
         return {}
+    from scipy.special import gammainc
+
     sd = np.median([read[rows].std(axis=0, ddof=1) for rows in poses if len(rows) > 1], axis=0)
     step = np.array([last_digit(read[:, k]) for k in range(3)])
     with np.errstate(divide="ignore", invalid="ignore"):
         chance = np.where(step > 0, np.minimum(1.0, step / (2 * np.sqrt(np.pi) * sd)), 0.0)
-    return {} if poisson.sf(equal - 1, pairs * float(np.prod(chance))) >= _CHANCE else found
+    by_rounding = float(gammainc(equal, pairs * float(np.prod(chance))))  # so many or more, of a Poisson distribution
+    return {} if by_rounding >= _CHANCE else found
 
 
 def counting(points: Points, *, angles: bool = False) -> NDArray[np.bool_]:
@@ -124,6 +126,8 @@ def five_in_a_plane(at: Floats, reach: float = np.nan) -> bool:
     """
     if len(at) < POSES:
         return False
+    from scipy.spatial import cKDTree
+
     ends = np.column_stack(np.triu_indices(len(at), 1))
     sums, reach = at[ends].sum(axis=1), 4 * _FLAT * float(np.ptp(at, axis=0).max()) * (1 + 1e-9)
     tree = cKDTree(sums)

@@ -15,18 +15,21 @@ import scipy
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
 from cmm_uq.base.points import Floats, Ints, Points
+<<<<<<< HEAD
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.conformity import Circumstances, RatedConditions, TestUncertainty, key_of_line
+=======
+from cmm_uq.base.units import HOUR, MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.jobs.tables.conformity import LINE_KEYS, Circumstances, RatedConditions, TestUncertainty
+>>>>>>> 0336b485 (Parallelism is looked for between parallel axes alone; poses of robots in little memory; the same certificate by rows and by screws; planned power against concealed faults)
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget
 
 LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")  # in the order of their budget
 SIZE_LINES, FORM_LINES, REPEAT_LINES = LENGTH_LINES[:3], ("form",), ("repeat",)
-ORIENTATION_LINES, TURNING_LINES = ("orientation",), ("turning",)  # of angles, as arcs over a length
 WARM = 0.5  # K from 20 °C from which on an unknown expansion matters
-# what a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others
-UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
-UNSTATED_RAD = 1e-4  # the same of an angle
+# what a line that is not stated may well be: of the temperature, of the coefficient (1/K), of an angle (rad), of all others
+UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_RAD, UNSTATED_UM = 0.3, 1e-6, 1e-4, 1.0
 # 1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)
 NORMAL_EXPANSION = 8e-6, 13e-6
 STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6  # 1/K; of what gauges are made of, aluminium expands most
@@ -36,8 +39,7 @@ _NAMES = {
     "temperature": say("temperature of the artefact"), "alignment": say("alignment of the artefact"),
     "fixturing": say("fixturing of the artefact"), "form": say("calibration of the form"),
     "repeat": say("what of the artefact changes between the readings"),
-    "orientation": say("measured angles of orientation, with alignment to the base"),
-    "turning": say("what of measured angles changes between the readings"),
+    "orientation": say("angles, with alignment to the base"), "turning": say("what of angles changes between readings"),
 }  # fmt: skip
 
 
@@ -73,8 +75,7 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
     per_length = {
         "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
         "expansion": away_from_20(artefact) * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
-        "orientation": UNSTATED_RAD,
-        "turning": UNSTATED_RAD,
+        **dict.fromkeys(("orientation", "turning"), UNSTATED_RAD),
     }
     missing = {line for line in _acting(lines, artefact) if not _met(line, artefact, under)}
     if "expansion" in lines and not under.cte_per_k and not under.uncertainty.declared("expansion"):
@@ -209,7 +210,6 @@ def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty)
     return replace(budget, lines=named)
 
 
-SECONDS_PER_HOUR = 3600.0
 _ROUNDING, _NAMED = 1e-9, 5  # K; copies that are named one by one
 
 
@@ -259,7 +259,7 @@ def _change(columns: Mapping[str, Floats], time_s: Floats | None, most: float) -
         return Condition(what, (say("{what}: no temperature is recorded over time{key}", what=what, key=key),))
     order = np.argsort(time_s, kind="stable")
     time = time_s[order]
-    ends = np.searchsorted(time, time + SECONDS_PER_HOUR, side="right")
+    ends = np.searchsorted(time, time + HOUR, side="right")
     largest = max(float(np.ptp(v[order][start:end])) for v in columns.values() for start, end in enumerate(ends))
     lacks = say("{what} ({largest:.3g} K in an hour)", what=what, largest=largest)
     return Condition(what, () if largest <= most + _ROUNDING else (lacks,))

@@ -350,8 +350,7 @@ def compensate(
     cloud: Path | None = option(
         None, "Cloud of a digitizer, or of rotary axes, to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
         "the job's recording"),
-    poses: Path | None = option(
-        None, "Poses of a robot to correct instead by its recording: .csv of q1_deg, q2_deg …", "FILE", "none"),
+    poses: Path | None = option(None, "Poses of a robot to correct instead: .csv of q1_deg, q2_deg …", "FILE", "none"),
     new_map: bool = option(
         False, "Write instead an error map of all errors that the job's recording shows; with rotary axes a file of them."),
     controller: str = option(
@@ -361,24 +360,24 @@ def compensate(
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own, or a robot's poses; or make maps of one."""
     from cmm_uq.analysis.machine.correction import FieldMap
-    from cmm_uq.app.commands.jobs import compensate as corrected, controller as tables
+    from cmm_uq.app.commands.jobs import compensate as corrected, compensate_poses, controller as tables
     from cmm_uq.machine.physics.map_interpolation import Beyond
 
     beyond: Beyond = "extrapolate" if extrapolate else "refuse"
+    kinds = {"--poses corrects poses": poses, "--new-map makes a map": new_map, "--controller makes tables": controller}
+    instead, others = (
+        [what for what, asked in kinds.items() if asked],
+        (cloud, map_text, extrapolate) != (None, None, False),
+    )
+    if instead[1:] or (instead and others):
+        against = "none of --cloud, --map-text and --extrapolate" if others else "nothing else that is written instead"
+        raise CmmUqError(f"{instead[0]}, and goes with {against}", fix="Leave out one of them")
     if poses is not None:
-        if new_map or controller or cloud is not None or map_text is not None or extrapolate:
-            problem = "--poses goes with none of --new-map, --controller, --cloud, --map-text and --extrapolate"
-            raise CmmUqError(problem, fix="Leave out one of them")
-        from cmm_uq.app.commands.jobs.compensate_poses import write_corrected_poses
-
         with end.progress() as stage:
-            files, said = write_corrected_poses(job, poses, out, force=end.force, stage=stage)
+            files, said = compensate_poses.write_corrected_poses(job, poses, out, force=end.force, stage=stage)
         conclude_derived(files, f"{poses.name}, corrected by the recording of {job}", end, is_job=False, remarks=said)
         return
     if new_map:
-        if cloud is not None or map_text is not None or extrapolate:
-            problem = "--new-map makes a map, and goes with none of --cloud, --map-text and --extrapolate"
-            raise CmmUqError(problem, fix="Leave out one of them")
         with end.progress() as stage:
             files, found = corrected.write_new_map(job, out, force=end.force, stage=stage)
         kind = "An error map" if isinstance(found, FieldMap) else "A file"
@@ -386,9 +385,6 @@ def compensate(
         conclude_derived(files, what, end, is_job=False, remarks=corrected.worth_of(found))
         return
     if controller:
-        if cloud is not None or map_text is not None or extrapolate:
-            problem = "--controller makes tables, and goes with none of --cloud, --map-text and --extrapolate"
-            raise CmmUqError(problem, fix="Leave out one of them")
         files, said = tables.write_tables(job, out, controller, force=end.force)
         conclude_derived(files, f"Tables of the axes of {job} for a controller", end, is_job=False, remarks=said)
         return

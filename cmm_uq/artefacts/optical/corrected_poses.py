@@ -100,20 +100,21 @@ def corrected_poses(model: RecordingModel, points: Points) -> CorrectedPoses:
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     about = here(_tool(acting, seen, mean, sizes))
     placing = _placing_root(about, weights, noise.sigma)
-    places = np.empty((DRAWS, len(points), 3))
-    for i in range(DRAWS):
+    exact = _tool(acting, points, mean, sizes)
+    at_mean, total, squares = here(exact), np.zeros((len(points), 3)), np.zeros((len(points), 3, 3))
+    for _ in range(DRAWS):
         drawn = mean + root @ random.standard_normal(len(root.T))
         there = carried(drawn)(_tool(acting, points, drawn, sizes))
         moved = placing @ random.standard_normal(6)
-        places[i] = there + moved[:3] + np.cross(moved[3:], there)
-    spread = places - places.mean(axis=0)
-    found = np.einsum("dni,dnj->nij", spread, spread) / (DRAWS - 1)
+        off = there + moved[:3] + np.cross(moved[3:], there) - at_mean
+        total += off
+        squares += off[:, :, None] * off[:, None]
+    found = (squares - total[:, :, None] * total[:, None] / DRAWS) / (DRAWS - 1)
     found = back.turn @ found @ back.turn.T
     left = (noise.sigma * noise.scale(reaches(points))) ** 2
     found += left[:, None, None] * np.eye(3)
     readings, missed, before = _commanded(acting, points, mean, sizes, to_base)
-    exact = to_base(_tool(acting, points, mean, sizes))
-    return CorrectedPoses(exact, found, noise.degrees, readings, missed, before)
+    return CorrectedPoses(to_base(exact), found, noise.degrees, readings, missed, before)
 
 
 def _station(tracked: TrackedPoints, used: Ints) -> Ints:

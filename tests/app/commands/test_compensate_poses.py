@@ -57,7 +57,7 @@ def test_poses_that_cannot_be_corrected_are_refused(head: str, row: str, problem
 
 
 @pytest.mark.parametrize(("job", "more", "said"), [
-    ("iota-1102-20C", [], "no joints, so no poses"), ("robot-simulated", ["--new-map"], "--poses goes with none of"),
+    ("iota-1102-20C", [], "no joints, so no poses"), ("robot-simulated", ["--new-map"], "poses, and goes with nothing else"),
 ])  # fmt: skip
 def test_other_machines_and_other_wishes_are_refused(job: str, more: list[str], said: str, tmp_path: Path) -> None:
     file, out = poses(tmp_path, "1,2,3,4,5,6,1"), str(tmp_path / "out")

@@ -160,3 +160,15 @@ def test_what_has_no_joints_has_none_of_these_effects() -> None:
     for effect in (Zero("q1"), ToolOffset()):
         with pytest.raises(CmmUqError, match="the machine has no joints"):
             effect.basis(points)
+
+
+def test_parallelism_is_looked_for_between_nearly_parallel_axes_alone() -> None:
+    """Elsewhere it is another name of zero, twist, length and offset: a joint off by its zero was said to be not parallel."""
+    alphas = np.radians([-90.0, 0.0, 3.0, 90.0, 180.0, 60.0])
+    rows = np.column_stack([np.full(6, 100.0), alphas, np.full(6, 50.0), np.zeros((6, 2))])
+    arm = Arm("r", rows=rows, revolute=np.ones(6, dtype=bool), sense=np.ones(6), limits=np.full((6, 2), np.nan))
+    one = np.ones(1, dtype=np.int64)
+    columns = {f"q{i}_deg": np.full(1, 10.0) for i in range(1, 7)}
+    points = Points(arm.posed(columns).tool, one, one, one, arm, columns)
+    shown = [effects_of_arm(points)[f"parallelism_q{i}"].shown_in(points) for i in range(1, 7)]
+    assert shown == [False, True, True, False, True, False]

@@ -19,7 +19,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, ArmPose, D
+from cmm_uq.base.arm import ALPHA, BETA, PARALLEL, THETA, A, Arm, ArmPose, D
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
@@ -108,6 +108,10 @@ class Parallelism(OfJoint):
     title, formula = say("Parallelism of {axis} and the next axis"), "β = β₀ + parallelism"
     points_to = say("axis {axis} and the next are not parallel: enter β, or check the bearings' seats")
     coefficients = (Parameter("arcsec", unit("″"), 400.0),)
+
+    def shown_in(self, points: Points) -> bool:
+        """Of axes that are nearly parallel: of others zero, twist, length and offset say the same, and what to do about it."""
+        return bool(abs(np.cos(arm_of(points).rows[self.index, ALPHA])) > PARALLEL)
 
 
 class Gain(OfJoint):
