@@ -30,7 +30,7 @@ from cmm_uq.analysis.conformity.uncertainty import (
 )
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Points
-from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import CompleteTest
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Indications

@@ -15,13 +15,8 @@ import scipy
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
 from cmm_uq.base.points import Floats, Ints, Points
-<<<<<<< HEAD
-from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.tables.conformity import Circumstances, RatedConditions, TestUncertainty, key_of_line
-=======
 from cmm_uq.base.units import HOUR, MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.tables.conformity import LINE_KEYS, Circumstances, RatedConditions, TestUncertainty
->>>>>>> 0336b485 (Parallelism is looked for between parallel axes alone; poses of robots in little memory; the same certificate by rows and by screws; planned power against concealed faults)
+from cmm_uq.jobs.tables.conformity import Circumstances, RatedConditions, TestUncertainty, key_of_line
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget
 
@@ -72,10 +67,9 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
     It counts before a value is called nonconforming, and for nothing else. The figures are this project's, larger than a
     laboratory that controls its temperature has; an expansion of which no coefficient is stated was not corrected at all.
     """
-    per_length = {
+    per_length = dict.fromkeys(("orientation", "turning"), UNSTATED_RAD) | {
         "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
         "expansion": away_from_20(artefact) * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
-        **dict.fromkeys(("orientation", "turning"), UNSTATED_RAD),
     }
     missing = {line for line in _acting(lines, artefact) if not _met(line, artefact, under)}
     if "expansion" in lines and not under.cte_per_k and not under.uncertainty.declared("expansion"):
