@@ -26,6 +26,7 @@ _RULE = re.compile(r"[-=_*+|.\s]*")
 DATED = re.compile(r"\d{4}[./-]\d{1,2}[./-]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,4}|\d:\d\d|年")
 _PRINTED, _BRACKETS = re.compile(r"\d[.,]\d"), re.compile(r"\([^)]*\)")
 _FORMULA = re.compile(r"(?<=\S)(?<![XYZxyz])\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
+_SPREAD = re.compile(r"\d\s?[sσ]")  # above a column, and no figure
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 DEEPEST = 4  # rows of a head
 _TITLES = 3  # between a head and its figures, at most
@@ -157,7 +158,7 @@ class CutSheet:
         filled = [k for k, cell in enumerate(row) if cell != ""]
         if all(isinstance(row[k], str) and _RULE.fullmatch(row[k]) for k in filled):  # type: ignore[arg-type]
             return "rule"
-        numbers = [k for k in filled if self.figures[i][k] is not None]
+        numbers = [k for k in filled if self.figures[i][k] is not None and not _SPREAD.fullmatch(self.text(i, k))]
         near = [j for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
         beside = [[k for k, f in enumerate(self.figures[j]) if f is not None] for j in near]
         if not numbers or self._place_within(i, numbers, beside):

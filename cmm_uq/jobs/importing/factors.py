@@ -41,6 +41,7 @@ _NEXT = re.compile(r"\W{0,3}|_|\W{0,2}n(?:o|r)?\W{1,2}|\W?no\W?", re.IGNORECASE)
 _BEFORE = re.compile(r"(?<![\d.,])第?(\d+)\s?(?:[.ªº°]|st|nd|rd|th|er|e|ère)?\s?$", re.IGNORECASE)
 _OF_ALL = re.compile(r"\s?(?:/|\b(?:of|von|de|di|sur|van|av|z|из)\b)\s?\d+")
 _OF_SEVERAL = re.compile(r"(?<![\d.,/])(\d{1,2})\s?(?:/|\b(?:of|von|de|di|sur|van|av|z|из)\b)\s?(\d{1,2})(?![\d.,/])")
+_DATE = re.compile(r"\b\d{1,4}([./-])\d{1,2}\1\d{2,4}\b|\b\d{1,2}:\d\d(?::\d\d)?\b")
 _PRINTED = re.compile(r"[.,:]\d")
 LETTERS = {*"ABCDEFGHabcdefgh"}  # of balls
 # in names, ahead of their numbers
@@ -214,13 +215,17 @@ def run_apart(label: Label, *, lengths: bool) -> list[Label]:
     if not lengths and hint(word[0], lengths=False) == LINE and hint(rest[0], lengths=True) != LINE:
         return []  # as measurements of balls are no runs
     named = Label("" if _counts_run(label.words) else label.words, rest, label.sort)
-    return [named] if fixes(codes(rest), codes(numbers)) else [named, Label("run", numbers, "part")]
+    one, other = codes(rest), codes(numbers)
+    if fixes(one, other) and fixes(other, one):
+        return [named]
+    # what names each run anew, as the file of each does, is no line
+    return [*(parts_of(named) if fixes(one, other) else [named]), Label("run", numbers, "part")]
 
 
 @lru_cache(maxsize=4096)
 def _run_in(text: str) -> tuple[str, str, str] | None:
     """The word for a run in a text, what else it says, and the number of the run; ``None`` where it has none."""
-    text = unicodedata.normalize("NFKC", text)
+    text = _DATE.sub(" ", unicodedata.normalize("NFKC", text))
     own = [*_COUNTED.finditer(text)]
     for k, word in enumerate(own):
         if word[0].isdigit() or word[0] == "第" or (len(word[0]) < len("run") and not unspaced(word[0])):

@@ -337,8 +337,7 @@ def _words_of_sums() -> tuple[frozenset[str], frozenset[str]]:
 def is_summary(row: Sequence[Cell]) -> bool:
     """Whether one of the first two cells is a word for a figure of other rows, or the first has a unit: ``Form (µm)``."""
     labels = [cell for cell in row if cell != ""][:2]
-    named = [c for c in labels if isinstance(c, str)]
-    texts = [re.sub(r"(?<=\w\w\w)\s*(?:[(\[].*|[:=].*$)", "", cell) for cell in named]
+    texts = [re.sub(r"(?<=\w\w\w)\s*(?:[(\[].*|[:=].*$)", "", c) for c in labels if isinstance(c, str)]
     words = [plain_words(text) for text in texts if not text[-1:].isdigit()]
     sums, others = _words_of_sums()
     known = words_of("rows")["summary"]

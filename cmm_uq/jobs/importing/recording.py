@@ -134,9 +134,8 @@ def _check_header(header: Sequence[str], name: str, needed: Sequence[str], machi
             strange_column(machine, one, header) for one in header if one[:2] == column[:2]
         ):
             unread = " (of an axis that nobody reads, give one number in all rows)" * (column in COORDINATES)
-            wrong.tell(
-                f"no column {column!r}", where=where, fix=f"{suggestion(column, set(header) - set(needed))}{unread}"
-            )
+            fix = f"{suggestion(column, set(header) - set(needed))}{unread}"
+            wrong.tell(f"no column {column!r}", where=where, fix=fix)
     wrong.refuse()
 
 

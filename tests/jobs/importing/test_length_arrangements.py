@@ -60,7 +60,8 @@ def test_numbers_of_lengths_are_no_lines_though_they_are_called_positions() -> N
     "title",
     ["POSITION {i}   RUN {r}", "Run {r} - Position {i}", "*** Line {i} (repeat {r} of 3) ***", "Position {i} ({r}/3)",
      "Messlinie {i}, Wiederholung Nr. {r}", "{r}. Lauf, Position {i}", "【測定位置 {i}】 {r}回目", "测量线{i} 第{r}次",
-     "Posizione {i} : prova n° {r}", "POS{i}-RUN{r}", "Line {i}, measurement {r}"],
+     "Posizione {i} : prova n° {r}", "POS{i}-RUN{r}", "Line {i}, measurement {r}",
+     "Line {i}, run {r}, 12.03.2019 08:1{r}", "Position {i}, run {r}, file 0{i}{r}7"],
 )  # fmt: skip
 def test_a_run_in_a_title_beside_the_name_of_a_line_is_a_run(title: str) -> None:
     rows = ["Unit: mm"]

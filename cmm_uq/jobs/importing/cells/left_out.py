@@ -72,7 +72,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
         within = first <= row < last or 0 < grid.sheet.lines[row] - grid.sheet.lines[last] == row - last  # no gap
         within |= readings[0].kind == "points" and row > first and columns <= {*figures}
         known = row in summed or (readings[0].kind == "points" and of_feature(grid, row))
-        if figures and within and not known and not _explained(grid, row, figures, rows, columns):
+        if figures and within and not known and not _known(grid, row, figures, rows, columns):
             return None
         told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures and row > first else []
     blank = [cell for one in readings for cell in one.blank]
@@ -82,9 +82,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     return told + [f"{place.removeprefix(': ').strip()}: nothing in the cell" for place in places]
 
 
-def _explained(
-    grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[int], columns: Collection[int]
-) -> bool:
+def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[int], columns: Collection[int]) -> bool:
     """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
     cells, block = grid.sheet.rows[row], grid.block_of[row].rows
     if header.is_summary(cells) or is_void(cells, "void", "feature"):
