@@ -112,9 +112,8 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     every = [c for own in triples for c in own.columns]
     if not triples or len({c.unit.name for c in every if c.unit}) > 1:
         return None
-    if all(c.step >= 1 for c in every) and any(
-        c.role in (None, "measured") and c.step < 1 < c.values[0] for c in lengths
-    ):
+    finer = any(c.role in (None, "measured") and c.step < 1 < c.values[0] for c in lengths)
+    if finer and all(c.step >= 1 for c in every):
         return None  # whole places, at which lengths were measured
     if any(_between(c, a, b) for a, b in combinations(triples, 2) for c in lengths if c not in every):
         return None  # places as they were set up, between which lengths were measured
@@ -153,9 +152,7 @@ def _a_radius(column: FigureColumn, of: Triple) -> bool:
     if not column.full or len(of.columns) < len(COORDINATES) or len(own) < _PROBED or np.isnan(own).any():
         return False
     step = 1.5 * max(column.step, *(c.step for c in of.columns if c.i >= 0))
-    return any(
-        np.abs(np.hypot(own[:, a], own[:, b]) - column.values).max() <= step for a, b in combinations(range(3), 2)
-    )
+    return any(np.abs(np.hypot(a, b) - column.values).max() <= step for a, b in combinations(own.T, 2))
 
 
 def _places(xyz: Floats) -> bool:

@@ -215,11 +215,11 @@ def run_apart(label: Label, *, lengths: bool) -> list[Label]:
     if not lengths and hint(word[0], lengths=False) == LINE and hint(rest[0], lengths=True) != LINE:
         return []  # as measurements of balls are no runs
     named = Label("" if _counts_run(label.words) else label.words, rest, label.sort)
-    one, other = codes(rest), codes(numbers)
-    if fixes(one, other) and fixes(other, one):
+    names_, runs = codes(rest), codes(numbers)
+    if fixes(names_, runs) and fixes(runs, names_):
         return [named]
     # what names each run anew, as the file of each does, is no line
-    return [*(parts_of(named) if fixes(one, other) else [named]), Label("run", numbers, "part")]
+    return [*(parts_of(named) if fixes(names_, runs) else [named]), Label("run", numbers, "part")]
 
 
 @lru_cache(maxsize=4096)

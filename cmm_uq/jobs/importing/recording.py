@@ -130,9 +130,8 @@ def _check_header(header: Sequence[str], name: str, needed: Sequence[str], machi
         elif wrong_name := misnamed(column, header) or strange_column(machine, column, header):
             wrong.tell(wrong_name[0], where=where, fix=wrong_name[1])
     for column in needed:
-        if column not in header and not any(
-            strange_column(machine, one, header) for one in header if one[:2] == column[:2]
-        ):
+        alike = [one for one in header if one[:2] == column[:2]]
+        if column not in header and not any(strange_column(machine, one, header) for one in alike):
             unread = " (of an axis that nobody reads, give one number in all rows)" * (column in COORDINATES)
             fix = f"{suggestion(column, set(header) - set(needed))}{unread}"
             wrong.tell(f"no column {column!r}", where=where, fix=fix)

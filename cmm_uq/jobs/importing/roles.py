@@ -106,7 +106,7 @@ class FigureColumn:
     @property
     def named(self) -> bool:
         """Whether words say what it is."""
-        return self.role is not None or self.is_length or any(hint(text, lengths=True) for text in self.path)
+        return bool(self.role or self.is_length or any(hint(without_unit(one)[0], lengths=True) for one in self.path))
 
     def factors(self, length: FigureColumn) -> tuple[float, ...]:
         """By what deviations are multiplied to be in the unit of lengths."""

@@ -83,6 +83,18 @@ def test_each_word_of_a_head_is_over_its_part_of_what_stands_below_it() -> None:
     assert read(lengths_of(rows)) == expected(2)
 
 
+def test_columns_called_m_are_runs_beside_a_column_of_lines_and_letters_behind_names_are_asked_about() -> None:
+    rows = ["Line,Cal (mm),M1 (mm),M2 (mm),M3 (mm),2s (µm)"]
+    rows += [
+        f"{i + 1},{LENGTHS[k]},{','.join(measured(i, k, r) for r in range(3))},0.8" for i in range(2) for k in range(4)
+    ]
+    assert read(lengths_of(rows)) == expected(2)
+    each = [(i, k, r) for i in range(2) for k in range(4) for r in range(3)]
+    named = [f"{'XY'[i]}_{k + 1}_{'abc'[r]};{LENGTHS[k]};{measured(i, k, r)}" for i, k, r in each]
+    with pytest.raises(CmmUqError, match="letters in names may be of runs or lines"):
+        imported("\n".join(["Feature;Nominal [mm];Actual [mm]", *named]).encode(), "e0.csv", ImportKeys())
+
+
 def test_what_is_permitted_and_what_is_not_corrected_are_no_deviations_and_no_lengths() -> None:
     rows = ["Linie;Lauf;Kalibrierlänge;Messwert unkorrigiert;Messwert korrigiert;Abweichung µm;zulässige Abweichung µm"]
     for i in range(2):

@@ -32,8 +32,10 @@ def lengths_of(references: Floats) -> Ints:
 def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
     """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
     count, several, found = len(reference), bool(reference.max(initial=0) > 0), factors.varying(labels, lengths=True)
-    if any(f[0].sort == "title" and f[2] == LINE for f in found):  # then M numbers measurements of a line
-        found = [(f[0], f[1], RUN if f[0].sort == "head" and counting(f[0].values) else f[2]) for f in found]
+    of_lines = {f[0].sort for f in found if f[2] == LINE and not (several and fixes(reference, f[1]))}
+    for k, (label, own, _) in enumerate(found if {"title", "column"} & of_lines else ()):
+        if label.sort == "head" and counting(label.values) and ("title" in of_lines or label.values[0][1:2].isdigit()):
+            found[k] = label, own, RUN  # M1, M2 are measurements of the line that is named
     found = [(f[0], f[1], LINE if f[2] is None and _says_places(f[0]) else f[2]) for f in found]
     above = [f for f in found if f[0].sort in ("title", "sheet", "block") and not fixes(f[1], reference)]
     # numbers of the lengths of each line, though they are called positions
@@ -109,6 +111,8 @@ def _told_apart(
         rows = bool(line) and _digits(one[0]) and reference.max() > 0 and fixes(one[1], reference)
         if rows or apart() == count or apart(one[1]) == apart():
             continue
+        if one[0].sort == "part" and line and run is None and {*one[0].values} <= {*"abcdefgh"}:
+            raise NotReadError("letters in names may be of runs or lines", where=place, fix="Number runs in a column")
         whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
         unsaid = any(f[2] is None for f in line) and one[2] is None and one[0].sort == "column"
         if run is None and (named or lined) and _digits(one[0]):
