@@ -129,11 +129,11 @@ def five_in_a_plane(at: Floats, reach: float = np.nan) -> bool:
     from scipy.spatial import cKDTree
 
     ends = np.column_stack(np.triu_indices(len(at), 1))
-    sums, reach = at[ends].sum(axis=1), 4 * _FLAT * float(np.ptp(at, axis=0).max()) * (1 + 1e-9)
+    sums, apart = at[ends].sum(axis=1), 4 * _FLAT * float(np.ptp(at, axis=0).max()) * (1 + 1e-9)
     tree = cKDTree(sums)
     for middle, place in enumerate(at):
         for pairs in np.split(np.arange(len(sums)), np.arange(_AT_ONCE, len(sums), _AT_ONCE)):
-            near = tree.query_ball_point(4 * place - sums[pairs], reach, return_sorted=False)
+            near = tree.query_ball_point(4 * place - sums[pairs], apart, return_sorted=False)
             first = np.repeat(pairs, [len(others) for others in near])
             second = np.concatenate([np.array(others, dtype=np.int64) for others in near])
             four = np.hstack([ends[first], ends[second]])[first < second]

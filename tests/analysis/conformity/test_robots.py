@@ -238,6 +238,12 @@ def test_five_poses_are_found_as_by_looking_at_every_choice() -> None:
     assert 20 < sum(found) < 100
 
 
+def test_poses_about_the_base_s_origin_are_wide_by_the_reach_not_by_how_far_they_lie() -> None:
+    at = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    assert five_in_a_plane(0.051 * REACH * at, REACH)
+    assert not five_in_a_plane(0.049 * REACH * at, REACH)
+
+
 def test_a_hundred_poses_are_searched_at_once() -> None:
     """Seventy-five million choices of five; on a sphere none lies in the middle of others, so that none may be left out."""
     way = np.random.default_rng(2).normal(size=(100, 3))
