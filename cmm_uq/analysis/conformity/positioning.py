@@ -210,8 +210,13 @@ def _short_of_travel(runs: Runs, artefact: Artefact) -> Iterator[Message]:
             key = at_key("[machine] travel_mm")
             yield say("the travel of {axis}{key}, of which its run is a part", axis=Verbatim(axis.upper()), key=key)
         elif length < _MOST * travel[axis]:
-            of = {"axis": Verbatim(axis.upper()), "length": length, "travel": travel[axis]}
-            yield say("two thirds of the travel of {axis} ({length:.0f} of {travel:.0f} mm)", **of)
+            name, whole = Verbatim(axis.upper()), travel[axis]
+            yield say(
+                "two thirds of the travel of {axis} ({length:.0f} of {travel:.0f} mm)",
+                axis=name,
+                length=length,
+                travel=whole,
+            )
 
 
 def _named(runs: Runs) -> list[str]:
@@ -273,8 +278,14 @@ def conditions(
         alike = np.all(run.x[..., :, None] == run.x[..., None, :], axis=(0, 1)) & ~np.eye(run.repeats, dtype=bool)
         if read and alike.any():
             first, second = (np.argwhere(alike)[0] + 1).tolist()
-            same = {"number": number, "first": first, "second": second}
-            few.append(say("measurement {number}: repeat {second} is repeat {first} to the last digit", **same))
+            few.append(
+                say(
+                    "measurement {number}: repeat {second} is repeat {first} to the last digit",
+                    number=number,
+                    first=first,
+                    second=second,
+                )
+            )
     what = _TURNS if of is axes and artefact.angular else what
     return (Condition(what, tuple(few) if runs else (what,)),)
 
