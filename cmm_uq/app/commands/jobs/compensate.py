@@ -6,14 +6,12 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from cmm_uq.analysis.machine.correction import FieldMap, field_map
 from cmm_uq.analysis.machine.rotary_correction import RotaryCorrection
-from cmm_uq.analysis.machine.state import of_machine
 from cmm_uq.app.commands.certificates.further import together_of
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.jobs.compensate_rotary import (
@@ -22,6 +20,7 @@ from cmm_uq.app.commands.jobs.compensate_rotary import (
     RotaryCompensation,
     error_files,
     errors_found,
+    estimated,
     in_words,
     worth_data,
     worth_in_words,
@@ -29,7 +28,6 @@ from cmm_uq.app.commands.jobs.compensate_rotary import (
 from cmm_uq.app.commands.jobs.simulate import recording
 from cmm_uq.app.commands.model import refuse_planned
 from cmm_uq.app.commands.reading import job_of, read_job, read_machine
-from cmm_uq.app.commands.report import evaluate_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import Owner, sha256_of, staged
@@ -37,7 +35,6 @@ from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import FurtherCertificates, further_data
-from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.regions import readings_data, readings_warnings
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, PROGRAM, derived_toml, is_compensated, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
@@ -135,12 +132,7 @@ def write_new_map(
         if rotary:
             errors = errors_found(read, seed, stage)
             return place.write(error_files(read, errors, _made_of(read, "file of errors"), PROVENANCE)), errors
-        stage("Estimating the errors", 0.0)
-        result, kind = evaluate_job(read, seed=seed), kind_of(read)
-        if not isinstance(result, Result) or not any(map(of_machine, result.model.effects)):
-            raise kind.refused("made an error map of")
-        observe = partial(kind.observing("reported"), read.facts.artefact, where=read.recording_path)
-        stage("Drawing all errors together", 0.4)
+        result, observe = estimated(read, "made an error map of", seed, stage)
         try:
             with physics_of(read):
                 together = together_of(read, result.model, result.posterior, result.doubt, seed)()

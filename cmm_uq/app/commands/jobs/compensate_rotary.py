@@ -23,6 +23,7 @@ from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.machines import in_coordinates
 from cmm_uq.jobs.source import sha256
+from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.predicted_errors import maps_of
 from cmm_uq.machine.physics.compensation import Compensation, circumstances, compensate_points, machine_compensation
 from cmm_uq.machine.physics.map_interpolation import (
@@ -173,6 +174,16 @@ class RotaryCloud:
         return self._by.distances(points, self._by.corrected(points).xyz)
 
 
+def estimated(read: Job, made: str, seed: int, stage: Stage) -> tuple[Result, Observed]:
+    """What a calibration finds of a machine's named errors, and how its artefact is observed; other jobs are refused."""
+    stage("Estimating the errors", 0.0)
+    result, kind = evaluate_job(read, seed=seed), kind_of(read)
+    if not isinstance(result, Result) or not any(map(of_machine, result.model.effects)):
+        raise kind.refused(made)
+    stage("Drawing all errors together", 0.4)
+    return result, partial(kind.observing("reported"), read.facts.artefact, where=read.recording_path)
+
+
 def errors_found(read: Job, seed: int, stage: Stage) -> RotaryCorrection:
     """Of a calibration with rotary axes."""
     if read.further:
@@ -181,12 +192,7 @@ def errors_found(read: Job, seed: int, stage: Stage) -> RotaryCorrection:
             where="job.toml [machine] further",
             fix="Leave them out",
         )
-    stage("Estimating the errors", 0.0)
-    result, kind = evaluate_job(read, seed=seed), kind_of(read)
-    if not isinstance(result, Result) or not any(map(of_machine, result.model.effects)):
-        raise kind.refused("made a file of errors of")
-    observe = partial(kind.observing("reported"), read.facts.artefact, where=read.recording_path)
-    stage("Drawing all errors together", 0.4)
+    result, observe = estimated(read, "made a file of errors of", seed, stage)
     with physics_of(read):
         found = rotary_correction(result.model, result.posterior, result.doubt, observe, seed)
     if found.disagree:
