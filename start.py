@@ -57,12 +57,20 @@ def prepare(extra: str) -> None:
     print(f"Preparing {ENVIRONMENT} (once; a few minutes at most) ...", file=sys.stderr, flush=True)
     if not (ENVIRONMENT / "pyvenv.cfg").is_file():
         venv.create(ENVIRONMENT, with_pip=True)
-    target = f"{ROOT}[{extra}]" if extra else str(ROOT)
-    pip = [str(SCRIPTS / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "--no-compile", "--editable", target], check=True, stdout=sys.stderr)
+    install(f"{ROOT}[{extra}]" if extra else str(ROOT))
     # on all processors, and no tests of others, which pip compiles on one
     compile_sources(ENVIRONMENT / ("Lib" if os.name == "nt" else "lib"))
     (ENVIRONMENT / f"installed-{extra}").write_text(wanted)
+
+
+def install(target: str) -> None:
+    """Install by uv, in a fifth of the time that pip takes, or by pip where uv cannot: only pip reads pip's configuration."""
+    python = str(SCRIPTS / "python")
+    pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    uv = [python, "-m", "uv", "pip", "install", "--quiet", "--python", python, "--editable", target]
+    if any(subprocess.run(command, check=False, stdout=sys.stderr).returncode for command in ([*pip, "uv"], uv)):
+        print("Once more, by pip ...", file=sys.stderr, flush=True)
+        subprocess.run([*pip, "--no-compile", "--editable", target], check=True, stdout=sys.stderr)
 
 
 def compile_changed() -> None:

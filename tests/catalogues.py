@@ -17,6 +17,7 @@ import polib
 
 from cmm_uq.base.languages.translation import ENGLISH, Code, file_of
 from tests.conftest import ROOT
+from tests.sources import tree_of
 
 PACKAGE = ROOT / "cmm_uq"
 SHOWN_ELSEWHERE = (
@@ -42,7 +43,7 @@ def sentences() -> dict[Key, list[str]]:
         name = path.relative_to(ROOT).as_posix()
         within = path.relative_to(PACKAGE).as_posix()
         if not within.startswith(SHOWN_ELSEWHERE) or within in SHOWN:
-            for key in patterns(ast.parse(path.read_text(encoding="utf-8"))):
+            for key in patterns(tree_of(path)):
                 files = found.setdefault(key, [])
                 files += [name] * (name not in files)
     return found

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterator
 from functools import cache
 from pathlib import Path
 from types import CodeType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -45,21 +45,41 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ["CMM_UQ_TESTS_SHARE"] = str(Path(config.option.basetemp).parent)
 
 
-LONG = (
-    "app/commands/test_verify_part.py", "app/commands/test_verify_part_machine.py", "app/commands/test_reissue.py",
-    "artefacts/test_contract.py", "test_one_verdict.py", "analysis/parts/test_zones.py", "certificate/test_one_page.py",
-    "site/test_site.py", "artefacts/test_certificate_figures.py", "hostile/test_kills_and_collisions.py",
-    "certificate/test_every_layout.py", "jobs/importing/test_unseen_exports.py", "app/commands/parts/test_part.py",
-    "analysis/diagnosis/test_equivalence.py", "analysis/conformity/test_circumstances.py",
-    "analysis/conformity/by_hand/test_by_hand.py", "app/desk/test_exports.py", "analysis/diagnosis/test_doubt.py",
-    "app/api/test_pictures.py", "analysis/conformity/test_grid.py", "app/cli/test_packages.py",
-    "artefacts/shift/test_plane.py", "site/test_notebooks.py", "certificate/diagnosis/test_overview.py",
-    "hostile/test_kernels.py", "app/commands/test_planning.py", "certificate/test_compose.py",
-    "app/commands/test_batch.py", "laboratory/schedule/test_cluster.py", "app/commands/test_new.py",
-    "laboratory/records/test_pending.py", "app/commands/test_analysis.py", "app/cli/test_report.py",
-    "analysis/diagnosis/test_diagnosis.py",
+FIRST = (
+    "artefacts/test_certificate_figures.py", "app/commands/test_verify_part.py", "app/commands/test_verify_part_machine.py",
+    "app/commands/test_reissue.py", "artefacts/test_contract.py", "analysis/parts/test_zones.py", "site/test_site.py",
+    "hostile/test_kills_and_collisions.py", "jobs/importing/test_unseen_exports.py", "app/commands/parts/test_part.py",
+    "analysis/diagnosis/test_equivalence.py", "analysis/conformity/by_hand/test_by_hand.py", "artefacts/test_poses.py",
+    "artefacts/test_five_axes.py", "app/desk/test_exports.py", "analysis/diagnosis/test_doubt.py",
+    "analysis/conformity/test_grid.py", "app/cli/test_packages.py", "site/test_notebooks.py", "hostile/test_kernels.py",
+    "hostile/test_every_command.py", "app/commands/test_planning.py", "app/commands/test_batch.py",
+    "laboratory/schedule/test_cluster.py", "app/commands/test_new.py", "laboratory/records/test_pending.py",
+    "app/cli/test_report.py", "analysis/diagnosis/test_diagnosis.py",
 )  # fmt: skip
 """Files that take longest, longest first: each runs on one core, so none is to be begun when the others are done."""
+TOGETHER = {"tests.artefacts.simulated": "examples", "tests.part_": "parts", "tests.sources": "sources",
+            "tests.catalogues": "sources"}  # fmt: skip
+"""What runs in one process, by what a file says: what takes long to make, and only a process keeps, is made once."""
+
+
+@cache
+def scope_of(file: str) -> str:
+    """The file itself, or with which others it runs."""
+    text = (ROOT / file).read_text(encoding="utf-8")
+    return next((scope for word, scope in TOGETHER.items() if word in text), file)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:
+    """Two processes are kept busy by scopes, the longest of them first; more of them by files."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scopes(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return scope_of(file) if self.numnodes <= 2 else file
+
+    return Scopes(config, log)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -126,8 +146,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             for mark, starters in STARTERS.items():
                 if named & starters:
                     item.add_marker(mark)
-    first = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
-    items.sort(key=lambda item: (first.get(item.path, len(LONG)), item.path.parts))
+    first = {ROOT / "tests" / name: place for place, name in enumerate(FIRST)}
+    items.sort(key=lambda item: (first.get(item.path, len(FIRST)), item.path.parts))
 
 
 def pytest_collection_finish() -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from cmm_uq.artefacts import BUILT_IN
 from tests.conftest import ROOT
+from tests.sources import nodes_of
 
 PACKAGE = ROOT / "cmm_uq"
 PAGE = (ROOT / "docs" / "layout.md").read_text(encoding="utf-8").partition("A domain imports")[0]
@@ -49,23 +50,17 @@ def module_of(path: Path) -> str:
 MODULES = {module_of(path): path for path in FILES}
 
 
-@cache
-def tree_of(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-def for_types_only(tree: ast.Module) -> set[ast.AST]:
-    blocks = (node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test))
+def for_types_only(path: Path) -> set[ast.AST]:
+    blocks = (node for node in nodes_of(path) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test))
     return {node for block in blocks for node in ast.walk(block)}
 
 
 @cache
 def imports(module: str) -> frozenset[str]:
     """The modules of the package that a module imports, anywhere in it but for types."""
-    tree = tree_of(MODULES[module])
-    passed = for_types_only(tree)
+    passed = for_types_only(MODULES[module])
     found = set()
-    for node in ast.walk(tree):
+    for node in nodes_of(MODULES[module]):
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cmm_uq") and node not in passed:
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= {name if name in MODULES else str(node.module) for name in inner}
@@ -122,7 +117,7 @@ def test_no_files_import_each_other_in_a_circle() -> None:
 def test_a_public_class_has_a_name_of_its_own() -> None:
     places = defaultdict(list)
     for module, path in MODULES.items():
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(module)
     assert not {name: modules for name, modules in places.items() if len(modules) > 1}
@@ -159,7 +154,7 @@ def test_no_file_is_a_slice_of_its_only_neighbour() -> None:
 
 
 def test_imports_stand_at_the_top() -> None:
-    functions = [node for module in MODULES for node in ast.walk(tree_of(MODULES[module]))
+    functions = [node for module in MODULES for node in nodes_of(MODULES[module])
                  if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]  # fmt: skip
     within = [node for function in functions for node in ast.walk(function)]
     inside = Counter(node.module or "" for node in within if isinstance(node, ast.ImportFrom))
@@ -173,7 +168,7 @@ def test_what_benchmarks_import_of_the_package_is_there() -> None:
     imported = {
         (node.module, alias.name)
         for path in (ROOT / "benchmarks").rglob("*.py")
-        for node in ast.walk(tree_of(path))
+        for node in nodes_of(path)
         if isinstance(node, ast.ImportFrom) and (node.module or "") in MODULES
         for alias in node.names
     }
@@ -197,5 +192,5 @@ def test_no_domain_below_knows_a_kind_by_name() -> None:
     """Only the kinds themselves, their registry and the commands do."""
     asked = [path for path in FILES if domain_of(module_of(path)) not in KNOW_KINDS
              and not path.relative_to(PACKAGE).as_posix().startswith(SHAPES_TOO)]  # fmt: skip
-    named = {path: {node.value for node in ast.walk(tree_of(path)) if isinstance(node, ast.Constant)} for path in asked}
+    named = {path: {node.value for node in nodes_of(path) if isinstance(node, ast.Constant)} for path in asked}
     assert not {module_of(path): names & set(BUILT_IN) for path, names in named.items() if names & set(BUILT_IN)}

@@ -38,6 +38,7 @@ from cmm_uq.base.messages import (
 from cmm_uq.base.units import unit
 from cmm_uq.machine.physics.effect import BLANKS
 from tests.conftest import ROOT
+from tests.sources import calls_of
 
 WORDS = [say("scale"), say("squareness"), say("pitch"), say("roll")]
 
@@ -129,8 +130,7 @@ def sayings(path: Path) -> list[ast.Call]:
     """Calls of the ``say`` of messages; the command line has one of its own, that prints."""
     if "cli" in path.parts:
         return []
-    return [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "say"]  # fmt: skip
+    return [call for call in calls_of(path) if isinstance(call.func, ast.Name) and call.func.id == "say"]
 
 
 def wrong(call: ast.Call, blanks: Collection[str] = ()) -> str:

@@ -27,6 +27,7 @@ from tests.catalogues import (
     read,
     sentences,
 )
+from tests.sources import tree_of
 
 wanted_sentences = cache(sentences)
 
@@ -73,7 +74,7 @@ def test_no_sentence_begins_or_ends_with_a_blank_that_a_translator_would_lose() 
 @pytest.mark.long
 def test_every_plural_has_both_forms_where_it_is_called() -> None:
     """Else each form would be an entry by itself, without the forms that a language has for it."""
-    trees = [(path.name, ast.parse(path.read_text(encoding="utf-8"))) for path in sorted(PACKAGE.rglob("*.py"))]
+    trees = [(path.name, tree_of(path)) for path in sorted(PACKAGE.rglob("*.py"))]
     calls = [(name, call, tree) for name, tree in trees for call in ast.walk(tree)
              if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "plural"]  # fmt: skip
     assert len(calls) > 40

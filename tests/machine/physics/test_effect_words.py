@@ -20,6 +20,7 @@ from cmm_uq.machine.physics.effect import CONTRACT, FURTHER, Effect, Nonparametr
 from cmm_uq.machine.physics.kinematics import carried_offset
 from tests.conftest import ROOT
 from tests.recordings import TRAVEL
+from tests.sources import calls_of, nodes_of
 
 PACKAGE = ROOT / "cmm_uq"
 TOLD = """
@@ -158,12 +159,11 @@ def displaced(effect: Effect, readings: Floats) -> Floats:
 
 def literals(path: Path) -> Iterator[tuple[int, str, bool]]:
     """Line and text of every string that is no docstring, parts of f-strings too, and whether it recognises by a part."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    said = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    compared = {id(argument) for node in ast.walk(tree)
-                if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in RECOGNISING
+    said = {id(node.value) for node in nodes_of(path) if isinstance(node, ast.Expr)}
+    compared = {id(argument) for node in calls_of(path)
+                if isinstance(node.func, ast.Attribute) and node.func.attr in RECOGNISING
                 for call in node.args for argument in ast.walk(call)}  # fmt: skip
-    for node in ast.walk(tree):
+    for node in nodes_of(path):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in said:
             yield node.lineno, node.value, id(node) in compared
 
