@@ -343,8 +343,9 @@ class CutSheet:
             )
             odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3
             over = [k for k in filled if k in numbers]
-            each = over == filled and len(over) + 1 >= len(numbers)  # then they stand above columns
-            placed = self.place(row) and not each and sum(map(places.says_figures, texts)) < _SEVERAL
+            said = sum(map(places.says_figures, texts))
+            each = (over == filled or not said) and len(over) + 1 >= len(numbers)  # then they stand above columns
+            placed = self.place(row) and not each and said < _SEVERAL
             if len(head) == DEEPEST or odd or not self._ruled.issuperset(between) or placed:
                 break
             apart = not head and (len(filled) < 2 or not over) and filled != over

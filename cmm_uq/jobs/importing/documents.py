@@ -17,7 +17,7 @@ from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import UNITS as PRINTED
 from cmm_uq.jobs.importing.cells.encodings import begins_with, local, root_of
 from cmm_uq.jobs.importing.format import LENGTHS, UNITS, Fact, Format, ImportKeys, Row, Sheet, length_named, sheets_of
-from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of
+from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of, without_results
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.dcc.figures import QuantityFigures
@@ -52,7 +52,7 @@ class Qif(Format):
             raise CmmUqError(problem, where=where, fix=fix)
         facts = facts_of(Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", ""))),
                          "features_not_used", say("Features that are no place"), others)  # fmt: skip
-        return sheets_of(rows, WITH_DIRECTION, unit=length_unit(root, where), decimal=".", facts=facts)
+        return without_results(sheets_of(rows, WITH_DIRECTION, unit=length_unit(root, where), decimal=".", facts=facts))
 
 
 def length_unit(root: Element, where: str) -> str | None:

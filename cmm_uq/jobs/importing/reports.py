@@ -6,10 +6,13 @@ import re
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
+import numpy as np
+
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.files.limits import LINE, ROWS
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.jobs.importing.cells.encodings import head_text, report_lines
@@ -17,6 +20,8 @@ from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, NotRead
 
 AXES = ("X", "Y", "Z")
 WITH_DIRECTION = ["name", "x", "y", "z", "i", "j", "k"]
+_COMPARED = 1_000_000  # distances
+_FEWEST, _FORM = 5, 0.005  # points about a centre that is their result, and by what part of its radius they are off
 _CALYPSO = ("idsymbol", "actual", "featureid")
 _CALYPSO_AXES = {"xvalue": "X", "yvalue": "Y", "zvalue": "Z"}
 
@@ -42,6 +47,22 @@ class TextReport(Format):
 def facts_of(encoding: Fact, key: str, label: Text, count: int) -> tuple[Fact, ...]:
     """The encoding, and how much of the report is not used."""
     return (encoding, Fact(key, label, number(count))) if count else (encoding,)
+
+
+def without_results(sheets: list[Sheet]) -> list[Sheet]:
+    """The sheet of points, where each place of all others is the centre of points that lie on one sphere or circle."""
+    most, *others = sorted(sheets, key=lambda sheet: -len(sheet.rows))
+    rows = [[row[1:4] for one in own for row in one.rows[1:]] for own in ([most], others)]
+    figures = (str(cell) for own in rows for row in own for cell in row)
+    if not others or len(rows[0]) * len(rows[1]) > _COMPARED or any(map(number_problem, figures)):
+        return sheets
+    xyz, centres = (np.array(own, dtype=np.float64) for own in rows)
+    away = np.linalg.norm(xyz[:, None] - centres, axis=2)
+    radii = [away[away.argmin(axis=1) == k, k] for k in range(len(centres))]
+    if any(len(own) < _FEWEST or np.ptp(own) > _FORM * own.mean() for own in radii):
+        return sheets
+    told = [f"line {line}: centre of points" for one in others for line in one.lines[1:]]
+    return [replace(most, left_out=(*most.left_out, *told))]
 
 
 @dataclass
@@ -169,7 +190,7 @@ class Dmis(TextReport):
             raise CmmUqError(f"holds {counted if others else 'no actual feature'} (FA)", where=where,
                              fix="Put the spheres or points out: OUTPUT/FA(…)")  # fmt: skip
         facts = facts_of(encoding, "features_not_used", say("Features that are no place"), others)
-        return sheets_of(rows, WITH_DIRECTION, unit=unit, decimal=".", facts=facts)
+        return without_results(sheets_of(rows, WITH_DIRECTION, unit=unit, decimal=".", facts=facts))
 
 
 def statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:

@@ -49,6 +49,10 @@ def lengths_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
             fitting[0].append(one)
         else:
             groups.append([one])
+    several = [c for own in families(columns) for c in own if len(own) > 1 and c.role == "deviation"]
+    lone = [own[0] for own in groups if own[0].role is None and len(own) == 1]
+    if several and len(lone) == len(groups) == 1 and side_by_side(several):
+        lone[0].role = "reference"  # of which each run has a deviation
     groups = [own for own in groups if len(own) > 1 or _alone(own[0], columns)]
     _refuse_far(grid, rows, groups)
     readings = [found for own in groups if (found := _lengths(grid, rows, columns, own)) is not None]

@@ -10,6 +10,7 @@ import re
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
@@ -132,7 +133,7 @@ def said_in(texts: Iterable[str], sign: str = ".") -> Said:
     for text in texts:
         plain = unicodedata.normalize("NFKC", text).replace("−", "-")
         said.axes |= {f"+{one[1]}" for one in _PLUS_LENGTH.finditer(plain)}
-        plain = _PLUS_LENGTH.sub("", plain)
+        plain = _first().sub(START, _PLUS_LENGTH.sub("", plain), count=1)
         last, before = 0, False
         for start, end, values, to in _figures(plain, sign, planes):
             gap, place = plain[last:start], to is None or len(values) == 3
@@ -161,6 +162,14 @@ def said_in(texts: Iterable[str], sign: str = ".") -> Said:
         axes = _AXIS.findall(plain)
         said.axes |= {sense + letters for sense, letters in axes if len(letters) == 1}
     return said
+
+
+@cache
+def _first() -> re.Pattern[str]:
+    """The first face, ball or hole of an artefact, by its number."""
+    called = "|".join(map(re.escape, sorted(words_of("columns")["point"], key=len, reverse=True)))
+    place = r"\W{0,3}(?:\w{2,6}\W{1,3})?(?:[XYZ]\s?[=:]|[(\[])"  # and no figures of a table, whose row names one
+    return re.compile(rf"(?<!\w)(?:{called})\s?(?:no|nr|n|#)?\W?\s?[01](?={place})", re.I)
 
 
 def _planes(text: str) -> set[str]:
