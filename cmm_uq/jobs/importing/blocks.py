@@ -21,6 +21,7 @@ from cmm_uq.jobs.importing.factors import LINE, RUN, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, NotReadError, Sheet, WrittenUnit, apart, unit_named
 from cmm_uq.jobs.importing.header import COVERAGE, WORD, named_alike, plain_words, without_unit, words_of
 from cmm_uq.jobs.importing.lengths import places
+from cmm_uq.jobs.importing.lengths.place_columns import place_columns
 
 _RULE = re.compile(r"[-=_*+|.\s]*")
 DATED = re.compile(r"\d{4}[./-]\d{1,2}[./-]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,4}|\d:\d\d|年")
@@ -30,11 +31,7 @@ _SPREAD = re.compile(r"\d\s?[sσ]")  # above a column, and no figure
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 DEEPEST = 4  # rows of a head
 _TITLES = 3  # between a head and its figures, at most
-_AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012]?(?![^\W_]))", re.IGNORECASE)
-_ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?0(?!\w)")
 _SEVERAL = 3  # places in a row, more than a line has
-_MEASURED = 0.05  # figures printed finer are no planned places
-FINER = 50  # times, that lengths are printed finer than the places where they were measured
 
 
 def heading(path: Sequence[str]) -> str:
@@ -64,6 +61,7 @@ class CutSheet:
         self.matched: set[str] = set()  # of what the job calls columns, what is there
         self.above: dict[int, list[str]] = {}  # of each row of figures, the title of its line and what follows it
         self._columns: dict[int, dict[str, list[int]]] = {}  # of coordinates of lines, by block
+        self.touched: dict[int, float] = {}  # to which step starts and ends are printed, where they were measured
         self.blocks = self._titled(list(self._blocks()))
         self.block_of = {row: block for block in self.blocks for row in block.rows}
         self.ends = {row for block in self.blocks for row in block.rows[named_alike(self.sheet.rows, block.rows) :]}
@@ -241,60 +239,28 @@ class CutSheet:
                 block.titles[row], before = {**own, **last}, own
         return blocks
 
-    def _place_columns(self, block: Block) -> dict[str, list[int]]:
-        """Columns of the coordinates of starts, ends or directions beside lengths: by words, else X, Y and Z twice."""
-        heads = [(i, " ".join(own)) for i, own in enumerate(block.paths) if any(self.figure(r, i) for r in block.rows)]
-        columns: dict[str, list[int]] = {}
-        for i, text in heads:
-            columns.setdefault(places.START if _ORIGIN.search(text) else places.role_among(text), []).append(i)
-        by_words = {of: own for of, own in columns.items() if of and len(own) == (1 if of in places.ANGLES else 3)}
-        if {places.START, places.CENTRE} & {*by_words} and len(by_words) > 1:
-            return by_words
-        named = (next((one for one in path[::-1] if _AXIS_LETTER.search(one)), "") for path in block.paths)
-        last = [one or (path[-1] if path else "") for one, path in zip(named, block.paths, strict=True)]
-        axes = ["".join(_AXIS_LETTER.findall(text)).upper() for text in last]
-        for i, text in enumerate(axes):
-            if not any(map(str.strip, last[i + 1 : i + 3])) and text == "XYZ":
-                axes[i : i + 3] = "XYZ"  # one head over three
-        six = [(i, axes[i]) for i, _ in heads if len(axes[i]) == 1]
-        if "".join(axis for _, axis in six) != "XYZXYZ":
-            return by_words
-        found = {places.START: [i for i, _ in six[:3]], places.END: [i for i, _ in six[3:]]}
-        others = [i for i in range(self.width) if i not in dict(six) and self._as_far(block, found, i)]
-        rows = [row for row in block.rows if all(self.figure(row, i) for i, _ in six)]
-        finest = [[f[1] for row in rows for i in own if (f := self.figure(row, i))] for own in (dict(six), others)]
-        step, fine = (min(own, default=1.0) for own in finest)
-        # finer ones are measured balls, unless a length beside them is much finer still
-        return found if others and (step >= _MEASURED or fine * FINER <= step) else by_words
-
-    def _as_far(self, block: Block, columns: Mapping[str, Sequence[int]], i: int) -> bool:
-        """Whether starts and ends are as far apart as the longest of the lengths in a column that were measured there."""
-        longest: dict[float, float] = {}
-        apart = np.nan
-        for row in block.rows:
-            ends = [(self.figure(row, k) or (np.nan,))[0] for one in (places.START, places.END) for k in columns[one]]
-            own = float(np.linalg.norm(np.subtract(ends[3:], ends[:3])))
-            apart = own if np.isfinite(own) else apart  # where a line is named once
-            if np.isfinite(apart):
-                longest[apart] = max(longest.get(apart, 0.0), (self.figure(row, i) or (0.0,))[0])
-        return bool(longest) and all(0.3 * apart < own <= 1.02 * apart + 1 for apart, own in longest.items())
-
     def says(self, row: int) -> tuple[str, ...]:
         """What may say where the line of a row lies: titles above it, texts beside it, columns of starts and ends."""
         block, texts = self.block_of[row], [*self.above.get(row, ())]
         if (columns := self._columns.get(block.number)) is None:
-            columns = self._columns[block.number] = self._place_columns(block)
+            columns = self._columns[block.number] = place_columns(self, block)
         for i, own in enumerate(self.figures[row]):
             if own is None and (text := self.text(row, i)):
                 role = places.role_among(heading(block.paths[i]) if i < len(block.paths) else "")
                 texts.append(f"{role} {text}" if role in (places.START, places.END) else text)
         first = min((i for own in columns.values() for i in own), default=0)
         values = {role: self._held(row, own, first) for role, own in columns.items()}
+        if here := values.pop("", []):
+            ahead = (self.text(row, first - 1), *block.paths[first - 1]) if first else ()
+            values |= dict.fromkeys([*filter(None, map(places.role_among, ahead))][:1], here)
         if all(values.get(angle) for angle in places.ANGLES):
             azimuth, elevation = (np.radians(values.pop(angle)[0]) for angle in places.ANGLES)
             across = np.cos(elevation)
             values[places.DIRECTION] = [across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)]
-        texts += [f"{of} ({'; '.join(f'{one:.10f}' for one in own)})" for of, own in values.items() if len(own) == 3]
+        # what was touched lies elsewhere each time
+        digits = max(1, round(-np.log10(1000 * self.touched.get(block.number, 1e-13))))
+        said = {of: "; ".join(f"{one:.{digits}f}".rstrip("0").rstrip(".") for one in own) for of, own in values.items()}
+        texts += [f"{of} ({said[of]})" for of, own in values.items() if len(own) == 3]
         return tuple(texts)
 
     def _held(self, row: int, columns: Sequence[int], first: int) -> list[float]:
@@ -363,6 +329,10 @@ class CutSheet:
         levels, begun = [], [False] * self.width
         for depth, row in enumerate(head):
             texts = [_FORMULA.sub("", self.text(row, k)) for k in range(self.width)]
+            for k, parts in enumerate(text.split() for text in texts):  # abbreviations in one cell, of a column each
+                alone = 1 < len(parts) <= self.width - k and all(part.endswith(".") for part in parts)
+                if alone and not any(self.text(own, i) for own in head for i in range(k + 1, k + len(parts))):
+                    texts[k : k + len(parts)] = parts
             begun = [before or bool(text) for before, text in zip(begun, texts, strict=True)]
             if depth < len(head) - 1:
                 below = [any(self.text(lower, k) for lower in head[depth + 1 :]) for k in range(self.width)]

@@ -19,12 +19,12 @@ from cmm_uq.base.messages import Text, Verbatim, commas, names, number, say, sem
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units, header as heads
-from cmm_uq.jobs.importing.blocks import FINER
 from cmm_uq.jobs.importing.cells.encodings import decimal_sign, is_number, split_units, values_of
 from cmm_uq.jobs.importing.cells.figures import figure
 from cmm_uq.jobs.importing.factors import Label
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, Cell, Fact, ImportKeys, NotReadError, Sheet, WrittenUnit
 from cmm_uq.jobs.importing.header import NAME, REMARK, SUMMARY, Header, filled_down, is_summary, named_alike, shown
+from cmm_uq.jobs.importing.lengths.place_columns import FINER
 from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
 from cmm_uq.jobs.importing.roles import names_length, said
 

@@ -161,11 +161,12 @@ def _places(xyz: Floats) -> bool:
 
 
 def _levels(grid: CutSheet) -> dict[str, float]:
-    """Coordinates that all points have, where texts say one of an axis: ``taken at Z = -412.5``."""
-    own: dict[str, set[float]] = {}
-    for match in _LEVEL.finditer("\n".join(grid.line(row) for row, kind in enumerate(grid.kinds) if kind == "text")):
-        own.setdefault(match[1].lower(), set()).update((figure(match[2], grid.sign) or (np.nan,))[:1])
-    return {axis: values.pop() for axis, values in own.items() if len(values) == 1}
+    """Coordinates that all points have, where each text that says one of any axis says it: ``taken at Z = -412.5``."""
+    texts = (grid.line(row) for row, kind in enumerate(grid.kinds) if kind == "text")
+    every = [[(match[1].lower(), figure(match[2], grid.sign)) for match in _LEVEL.finditer(text)] for text in texts]
+    each = [{axis: f[0] for axis, f in own if f and all(f == g for b, g in own if b == axis)} for own in every if own]
+    first, *others = each or [{}]
+    return {axis: value for axis, value in first.items() if all(own.get(axis) == value for own in others)}
 
 
 def _named(columns: Sequence[FigureColumn], levels: Mapping[str, float]) -> list[Triple]:

@@ -1,29 +1,48 @@
-"""Documents in XML: results of QIF (ANSI/DMSC QIF 3.0, ISO 23952), and digital calibration certificates (DCC 3, PTB).
+"""Documents: QIF (ANSI/DMSC QIF 2 and 3.0, ISO 23952), digital calibration certificates (DCC 3, PTB), web pages, JSON, XML.
 
 Of QIF measured spheres, points and circles are read, or the measured points themselves; of a certificate the quantities of a
-result, a column each, by the names that it gives.
+result, a column each, by the names that it gives; of a web page its tables; of any other JSON or XML its records, a row each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from html.parser import HTMLParser
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.limits import ROWS
+from cmm_uq.base.files.limits import COLUMNS, ROWS
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import UNITS as PRINTED
-from cmm_uq.jobs.importing.cells.encodings import begins_with, local, root_of
-from cmm_uq.jobs.importing.format import LENGTHS, UNITS, Fact, Format, ImportKeys, Row, Sheet, length_named, sheets_of
+from cmm_uq.jobs.importing.cells.encodings import begins_with, decoded, head_text, local, root_of
+from cmm_uq.jobs.importing.format import (
+    LENGTHS,
+    UNITS,
+    Cell,
+    Fact,
+    Format,
+    ImportKeys,
+    Row,
+    Sheet,
+    length_named,
+    sheets_of,
+)
 from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of, without_results
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.dcc.figures import QuantityFigures
 
-_MEASUREMENT = "FeatureMeasurement"
-PLACED = tuple(f"{sort}{_MEASUREMENT}" for sort in ("Sphere", "Point", "Circle"))
+_MEASUREMENT = ("FeatureMeasurement", "FeatureActual")  # as QIF 3 and as QIF 2 call them
+PLACED = tuple(f"{sort}{one}" for sort in ("Sphere", "Point", "Circle") for one in _MEASUREMENT)
+_DEEPEST = 40  # records within records
+_HIDDEN, _WITHIN = (
+    ("script", "style"),
+    ("a", "b", "br", "em", "i", "small", "span", "strong", "sub", "sup"),
+)  # of a web page
+_EXPORT = "Export the table as CSV or .xlsx"
 
 
 class Qif(Format):
@@ -74,7 +93,7 @@ def length_unit(root: Element, where: str) -> str | None:
 
 
 def _feature(element: Element, named: dict[str, str], where: str) -> Row:
-    sort, number_ = local(element).removesuffix(_MEASUREMENT).lower(), element.get("id", "")
+    sort, number_ = local(element).partition("Feature")[0].lower(), element.get("id", "")
     place = f"{where}: {local(element)} id {number_}"
     xyz = three(child(element, "Location"), place)
     label = named.get(child(element, "FeatureItemId"), "") or number_
@@ -163,3 +182,213 @@ def _sheet(name: str, columns: Sequence[tuple[str, list[str]]], where: str) -> S
                          fix="Ask the laboratory for a certificate whose lists belong together")  # fmt: skip
     full = ([heading, *(values if len(values) == count else values * count)] for heading, values in columns)
     return Sheet(name, list(zip(*full, strict=True)), [1, *range(1, count + 1)], decimal=".")
+
+
+class Html(Format):
+    """A web page: its tables and the texts between them, in one sheet."""
+
+    name = "html"
+    title = say("web page (HTML)")
+
+    def recognises(self, head: bytes) -> bool:
+        return head_text(head)[:512].lstrip("\ufeff \r\n\t").lower().startswith(("<!doctype html", "<html"))
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        text, encoding = decoded(content, where, keys.encoding)
+        page = _Page()
+        page.feed(text)
+        page.close()
+        page.end()
+        return [_of_rows(page.rows, page.lines, where, Fact("encoding", say("Encoding"), Verbatim(encoding)))]
+
+
+class _Page(HTMLParser):
+    """Rows of cells of all tables of a page, and its other texts in rows of their own."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rows, self.lines = list[list[Cell]](), list[int]()
+        self.row: list[str] | None = None
+        self.text: list[str] = []  # of a cell or a text that has begun
+        self.down: dict[int, int] = {}  # rows that a cell above still reaches into, by column
+        self.spans = (1, 1)
+        self.hidden = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.hidden |= tag in _HIDDEN
+        if tag in ("tr", "table") or (self.row is None and tag not in _WITHIN):
+            self.end()
+        if tag == "table":
+            self.down = {}
+        elif tag == "tr":
+            self.row = []
+        elif tag in ("td", "th"):
+            self.cell()
+            given = dict(attrs)
+            down, across = (given.get(key) or "1" for key in ("rowspan", "colspan"))
+            self.spans, self.text = (_span(down, ROWS.most), _span(across, COLUMNS.most)), [""]
+        elif tag == "br":
+            self.text.append(" ")
+
+    def handle_endtag(self, tag: str) -> None:
+        self.hidden &= tag not in _HIDDEN
+        if tag in ("td", "th"):
+            self.cell()
+        elif tag in ("tr", "table") or (self.row is None and tag not in _WITHIN):
+            self.end()
+
+    def handle_data(self, data: str) -> None:
+        self.text += [] if self.hidden else [data]
+
+    def cell(self) -> None:
+        """A cell ends."""
+        if self.row is None or not self.text:
+            return
+        for k in range(self.spans[1]):
+            self.skip()
+            self.down[len(self.row)] = self.spans[0]
+            self.row.append("" if k else " ".join("".join(self.text).split()))
+        self.text = []
+
+    def skip(self) -> None:
+        """Cells above reach into these columns."""
+        while self.row is not None and self.down.get(len(self.row), 0) > 0 and len(self.row) <= COLUMNS.most:
+            self.row.append("")
+
+    def end(self) -> None:
+        """A row of a table ends, or a text between tables."""
+        if self.row is not None:
+            self.cell()
+            self.skip()
+            self.down = {k: n - 1 for k, n in self.down.items() if n > 1}
+        cells = [" ".join("".join(self.text).split())] if self.row is None else self.row
+        if any(cells):
+            self.rows.append([*cells])
+            self.lines.append(self.getpos()[0])
+        self.row, self.text = None, []
+
+
+def _span(text: str, most: int) -> int:
+    """Columns or rows that a cell reaches over."""
+    return min(int(text), most) if text.isascii() and text.isdecimal() and 0 < len(text) < len("1000000") else 1
+
+
+class Json(Format):
+    """Records of JSON (RFC 8259)."""
+
+    name = "json"
+    title = say("records (JSON)")
+
+    def recognises(self, head: bytes) -> bool:
+        return head_text(head).lstrip("\ufeff \r\n\t")[:1] in ("{", "[") and b'"' in head
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        text, encoding = decoded(content, where, keys.encoding)
+        try:
+            whole = json.loads(text.lstrip("\ufeff"), parse_float=str, parse_int=str, parse_constant=str)
+        except (ValueError, RecursionError) as error:
+            line = getattr(error, "lineno", 0)
+            raise CmmUqError(f"is damaged JSON: {error}", where=f"{where} line {line}" if line else where,
+                             fix="Export it again: it was cut off or changed") from None  # fmt: skip
+        return [_of_records(whole, where, Fact("encoding", say("Encoding"), Verbatim(encoding)))]
+
+
+class Xml(Format):
+    """Records of any XML: elements with attributes, texts and other elements."""
+
+    name = "xml"
+    title = say("records (XML)")
+
+    def recognises(self, head: bytes) -> bool:
+        return head_text(head).lstrip("\ufeff \r\n\t").startswith("<?xml")
+
+    def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
+        return [_of_records(_nested(root_of(content, where), where, 0), where)]
+
+
+def _nested(element: Element, where: str, depth: int) -> Any:
+    """An element as JSON would have it: one that has nothing but a text is that."""
+    _check_depth(depth, where)
+    text, inside = " ".join((element.text or "").split()), dict[str, list[Any]]()
+    for one in element:
+        inside.setdefault(local(one), []).append(_nested(one, where, depth + 1))
+    if not inside and not element.attrib:
+        return text
+    own: dict[str, Any] = {name.rpartition("}")[2]: value for name, value in element.attrib.items()}
+    own |= {local(element): text} if text else {}
+    for name, values in inside.items():
+        plain = len(values) == 1 and not isinstance(values[0], dict)
+        own[name if name not in own else f"{name} {len(own)}"] = values[0] if plain else values
+    return own
+
+
+def _check_depth(depth: int, where: str) -> None:
+    if depth > _DEEPEST:
+        raise CmmUqError(f"has records within records, more than {_DEEPEST} deep", where=where, fix=_EXPORT)
+
+
+class _Records:
+    """A row for each innermost record, with what the records around it say; what is said once stands above as text."""
+
+    def __init__(self, whole: Any, where: str) -> None:
+        self.rows: list[list[Cell]] = []
+        self.head: list[str] = []
+        self.where = where
+        nodes = whole if isinstance(whole, list) else [whole]
+        for node in nodes:
+            self.walk(node, "", {}, 0, one=len(nodes) == 1)
+
+    def walk(self, node: Any, name: str, around: Mapping[str, str], depth: int, *, one: bool) -> None:
+        """A record: ``around``, what those around it say; ``one``: whether it stands alone, and what it says holds for all."""
+        _check_depth(depth, self.where)
+        fields = {f"{k}": part for k, part in enumerate(node, 1)} if isinstance(node, list) else node
+        if not isinstance(fields, dict):
+            self.tell(name, node)
+            return
+        own, inner = dict(around), [(key, value) for key, value in fields.items() if _inner(value)]
+        for key, value in fields.items():
+            if _inner(value):
+                continue
+            if one:
+                self.tell(f"{name} {key}".strip(), value)
+            for label, part in _parts(key, value).items() if not one else ():
+                own[label if label not in own else f"{name} {label}"] = "" if part is None else str(part)
+        for key, value in inner:
+            values = value if isinstance(value, list) else [value]
+            for record in values:
+                self.walk(record, key, own, depth + 1, one=one and len(values) == 1)
+        if not inner and not one:
+            self.add(own)
+
+    def tell(self, name: str, value: Any) -> None:
+        text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+        self.rows.append([f"{name}: {text}" if name else text])
+
+    def add(self, own: Mapping[str, str]) -> None:
+        if self.head != [*own]:
+            self.head = [*own]
+            self.rows.append([*own])
+        self.rows.append([*own.values()])
+        if len(self.rows) > ROWS.most or len(own) > COLUMNS.most:
+            raise CmmUqError("has more records than are read", where=self.where, fix="Split it")
+
+
+def _inner(value: Any) -> bool:
+    """Whether it holds records."""
+    return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(part, dict | list) for part in value))
+
+
+def _parts(key: str, value: Any) -> dict[str, Any]:
+    """Columns of one field, of several values one each."""
+    return {f"{key} {k}": part for k, part in enumerate(value, 1)} if isinstance(value, list) else {key: value}
+
+
+def _of_records(whole: Any, where: str, *facts: Fact) -> Sheet:
+    rows = _Records(whole, where).rows
+    return _of_rows(rows, [*range(1, len(rows) + 1)], where, *facts)
+
+
+def _of_rows(rows: list[list[Cell]], lines: list[int], where: str, *facts: Fact) -> Sheet:
+    if not rows or len(rows) > ROWS.most:
+        raise CmmUqError("holds no table" if not rows else "is too long", where=where, fix=_EXPORT)
+    return Sheet("", rows, lines, facts=facts)

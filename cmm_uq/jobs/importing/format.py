@@ -326,7 +326,7 @@ _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
 # Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
     *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc", "reports.Calypso", "reports.Qdas"),
-    *("reports.Dmis", "pcdmis.PcDmis", "reports.Ipp", "lines.Rtl"),
+    *("reports.Dmis", "pcdmis.PcDmis", "reports.Ipp", "lines.Rtl", "documents.Html", "documents.Json", "documents.Xml"),
 )
 
 
@@ -342,8 +342,6 @@ def format_of(content: bytes, where: str) -> Format:
     for start, what, fix in _UNREAD:
         if head.startswith(start):
             raise CmmUqError(what, where=where, fix=fix)
-    if head[:512].lstrip().lower().startswith((b"<!doctype html", b"<html")):
-        raise CmmUqError("is a web page", where=where, fix="Export the table as CSV or .xlsx")
     if (text := _built_in("tabular.Delimited")).recognises(head):
         return text
     what = "is empty" if not content.strip() else "is no text, and no format of measurements that is known here"

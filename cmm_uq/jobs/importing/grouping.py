@@ -7,6 +7,7 @@ break ties. Where nothing stands beside them, the order in which distances come 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -17,6 +18,8 @@ import scipy
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing import factors
 from cmm_uq.jobs.importing.factors import LINE, POINT, RUN, Counted, Label, codes, counted, fixes, in_turn, together
+from cmm_uq.jobs.importing.format import NotReadError
+from cmm_uq.jobs.importing.roles import said
 
 _SAME_PLACE_MM = 0.5
 _RIGID_MM = 0.1
@@ -24,6 +27,7 @@ _EVEN_MM = 0.2  # to which the points of a plate are evenly spaced
 _COMPARED = 5000  # points of which all places are compared; of more those that come again equally often
 _CROWDED, _NEARLY = 20, 0.98  # points at one place, from which on they are a scan; part of the places
 _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
+_ANGLE = re.compile(r"°(?!\s?[CF])|度|\bdeg\b")
 # what speaks for a way, the strongest first
 _TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED, _AT_LEAST = 6.0, 5.0, 4.0, 3.0, 2.0, 1.0
 _APART = 3  # times what repeats scatter, which is more than drift
@@ -94,6 +98,12 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     best = max(ways, key=lambda way: (way.rank, -way.measurement.max()), default=None)
     if best is None:
         return None
+    roles = {value: said(value) for value in best.of[0].values} if best.of is not None else {}
+    if len(roles) == 2 and len({*roles.values()}) == 2 and {"measured", "nominal"} & {*roles.values()}:
+        sets = ", ".join(map(repr, roles))
+        raise NotReadError(
+            f"{sets} may be measured places and others of the same points", fix="Export the measured ones"
+        )
     own = best.measurement
     alike = (way.measurement for way in ways if way.rank == best.rank)
     if best.rank <= _NAMED and not all(fixes(own, one) and fixes(one, own) for one in alike):
@@ -298,6 +308,9 @@ def _told(way: Grouping, found: Sequence[Counted], xyz: Floats, labels: Sequence
                 together(measurement, one[1]),
                 together(one[1], at),
             )
+    if (turn := next((f[0].words for f in (way.of, run) if f and _ANGLE.search(f[0].words)), None)) is not None:
+        what = f"places come again at each {turn.strip()!r}, which may be of a table that turned"
+        raise NotReadError(what, fix="Write a recording with it as c_deg: docs/reference/columns.md")
     first = np.unique(measurement, return_index=True)[1]
     texts = [" ".join(one[k] for one in named) or "1" for k in first]
     columns = {"measurement": [texts[m] for m in measurement.tolist()]}

@@ -216,10 +216,11 @@ class _Runs:
                 continue
             if match := _SECTION.fullmatch(text):
                 section, part = match[1], ""
-            elif match := _KEY.fullmatch(text):
-                part = match[1].lower()
-                self.facts.setdefault(part, match[2].strip())
-            elif section in ("TARGET DATA", "TARGETS") and part == "targets":
+            elif all(keys := [_KEY.fullmatch(one) for one in text.split(" ; ")]):
+                for match in filter(None, keys):
+                    part = match[1].lower()
+                    self.facts.setdefault(part, match[2].strip())
+            elif section in ("TARGET DATA", "TARGETDATA", "TARGETS") and part == "targets":
                 self.targets += self._figures(text, f"{where} line {number}")
             elif section in ("DEVIATIONS", "DATA") and part.startswith("run target data"):
                 figures = self._figures(text, f"{where} line {number}")
@@ -254,7 +255,10 @@ class _Runs:
 
 class Rtl(TextReport):
     name, title = "rtl", say("Laser interferometer (RTL)")
-    shows = (re.compile(r"^\s{0,9}TARGET(?: DATA|S)::", re.M), re.compile(r"^\s{0,9}Target-count\s{0,9}:", re.M))
+    shows = (
+        re.compile(r"^\s{0,9}TARGET(?: ?DATA|S)::", re.M),
+        re.compile(r"(?:^| ;)\s{0,9}Target-count\s{0,9}:", re.M),
+    )
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         sheets = super().read(content, where, keys)

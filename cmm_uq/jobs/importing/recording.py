@@ -31,6 +31,7 @@ from cmm_uq.jobs.importing.columns import columns_of
 from cmm_uq.jobs.importing.format import Fact, Format, ImportKeys, NotReadError, Recognition, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, axis_runs, placed, placed_runs
+from cmm_uq.jobs.importing.roles import said
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
 from cmm_uq.jobs.machines import coordinates, required_columns, strange_column
@@ -209,11 +210,19 @@ def _imported(
     try:
         sheets = _sheets_of(form, content, where, keys)
         sheet, header = _chosen(sheets, keys, where, wanted)
+        head = tuple(head_of(sheet.rows[header.row])) if header.row < header.first else ()
         if sheet.rows[header.row] in sheet.rows[header.row + 1 :] or any(
             map(heads.names_axes, sheet.rows[header.first + 1 :])
         ):
             raise NotReadError("its head comes again", where=sheet.at(where, header.row), fix="Export one table")
-        head = tuple(head_of(sheet.rows[header.row])) if header.row < header.first else ()
+        if (
+            not keys.columns
+            and len(header.columns.get("x_mm", ())) == 2
+            and {"reference", "measured"} <= {*map(said, head)}
+        ):
+            raise NotReadError(
+                "its rows are lengths with both ends", where=sheet.at(where, header.row), fix="Name columns"
+            )
         return _points(sheet, header, keys, where, reach_mm, replace(recognised, head=head), points=wanted is POINTS)
     except NotReadError as error:
         problem = error

@@ -31,6 +31,7 @@ _ROLES = {name: role for role, names in _OF_NAMES.items() for name in names.spli
 _CLAIMS: Mapping[Role, tuple[Role, ...]] = {"reference": ("reference", "nominal", "target")}
 _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
 _FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
+_NUMBERED = 0.05  # lines may be 1.1 and 1.2, and are no finer figures
 _INFLECTED = 7  # letters of a word of which the last may be another
 _COARSE = 0.05  # mm: figures printed no finer than this are nominal, and exact
 Labels = dict[tuple[str, str], str]  # what stands beside an observation, by sort and words
@@ -286,14 +287,17 @@ def _beside(grid: CutSheet, rows: Sequence[int], used: set[int]) -> list[Labels]
     """Names and numbers that stand beside rows, and titles above them."""
     out: list[Labels] = [{} for _ in rows]
     paths = grid.block_of[rows[0]].paths
+    lined = False
     for i in sorted({*range(len(paths))} - used):
         cells = [grid.text(row, i) for row in rows]
         said_to_be = grid.named(i, paths[i])
         name = "run" if said_to_be == "repeat" else said_to_be or heading(paths[i])
         of_line = hint(name, lengths=True) == "line"
-        if of_line and not cells[0]:
+        if of_line and not cells[0] and (any(cells) or not lined):
             out[0]["unnamed", grid.at(rows[0], i)] = name
-        decimals = not of_line and any(n is not None and n[1] < 1 for n in (grid.figure(row, i) for row in rows))
+        lined |= of_line and bool(cells[0])
+        finest = min((n[1] for n in (grid.figure(row, i) for row in rows) if n is not None), default=1.0)
+        decimals = finest < (_NUMBERED if of_line else 1)
         if decimals or not cells[0] or any(DATED.search(cell) for cell in cells[:3]):
             continue
         last = ""
