@@ -288,8 +288,9 @@ class Json(Format):
             whole = json.loads(text.lstrip("\ufeff"), parse_float=str, parse_int=str, parse_constant=str)
         except (ValueError, RecursionError) as error:
             line = getattr(error, "lineno", 0)
-            raise CmmUqError(f"is damaged JSON: {error}", where=f"{where} line {line}" if line else where,
-                             fix="Export it again: it was cut off or changed") from None  # fmt: skip
+            at = f"{where} line {line}" if line else where
+            fix = "Export it again: it was cut off or changed"
+            raise CmmUqError(f"is damaged JSON: {error}", where=at, fix=fix) from None
         return [_of_records(whole, where, Fact("encoding", say("Encoding"), Verbatim(encoding)))]
 
 
