@@ -323,11 +323,12 @@ def overview_of(history: MachineHistory) -> doc.Overview:
         for holds in (lambda one: one.beyond, lambda one: one.probably_beyond(history.on), history.significant)
     )
     last = history.decision
+    doubt = [one.found for one in history.doubtful if one.until is None]
     fails, open_ = bool(beyond) or last in BEYOND, last not in (*BEYOND, "pass", NONE)
     doubtful = open_ or probable or changed or not history.values
-    standing: doc.Standing = "bad" if fails else "open" if doubtful else "good"
+    standing: doc.Standing = "bad" if fails or doubt else "open" if doubtful else "good"
     verdict, *_ = holding(
-        (not history.values, say("Nothing is recorded yet")), (fails, say("Beyond its limits")),
+        (not history.values, say("Nothing is recorded yet")), (fails, say("Beyond its limits")), (doubt, say("In doubt")),
         (open_, say("Its last certificate does not state that it conforms")),
         (probable, say("Probably beyond a limit by now")), (changed, say("Changed since the last time")),
         (True, say("No change that stands out")),
@@ -339,6 +340,7 @@ def overview_of(history: MachineHistory) -> doc.Overview:
     ]
     return doc.Overview(verdict, standing, doc.facts(
         (say("Last decision"), OUTCOME_WORDS.get(last, Verbatim(last)) if last != NONE else NOTHING),
+        (say("In doubt"), semicolons(commas([Verbatim(one.number or one.job), day(one.day)]) for one in doubt)),
         (say("Beyond a limit"), commas(beyond)), (say("Changed significantly"), commas(changed)),
         (say("First to cross its limit"), commas(first)),
     ).rows)  # fmt: skip

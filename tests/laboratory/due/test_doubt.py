@@ -13,7 +13,7 @@ import pytest
 from cmm_uq.app.commands.laboratory.due import history_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.pages.doubt import doubt_data, doubt_words
-from cmm_uq.certificate.pages.history import history_document
+from cmm_uq.certificate.pages.history import history_document, overview_of
 from cmm_uq.certificate.render import render_html
 from cmm_uq.laboratory.due.doubt import DoubtfulPeriod, doubtful_periods, with_parts
 from cmm_uq.laboratory.records import open_records
@@ -124,6 +124,18 @@ def test_history_names_the_parts_between_a_good_and_a_failed_check(tmp_path: Pat
     (tmp_path / "other").mkdir()
     nowhere = history_of("1102", tmp_path / "records.db", on=dt.date(2024, 7, 1), parts=[tmp_path / "other"])
     assert str(doubt_words(nowhere.doubtful[0])).endswith("No report of a part that was measured then is known.")
+
+
+def test_a_machine_that_its_last_check_finds_out_of_control_is_in_doubt_whatever_its_values(tmp_path: Path) -> None:
+    """A pass of its certificate, and values within their limits, do not say that it is in order."""
+    stated = [["scale_x.ppm", "Scale error of x", "ppm", 2.0, 0.5, 1.0, 3.0, 0.2, 8.0]]
+    with open_records(tmp_path / "records.db", create=True) as records:
+        for day, further in ((dt.date(2024, 1, 1), {}), (dt.date(2024, 6, 1), {"interim": True, "decision": "fail"})):
+            entry = recorded(day=day, values=stated, **further)
+            records.append_all([("check" if further else "report", entry, moment(day))])
+    said = overview_of(history_of("1102", tmp_path / "records.db", on=dt.date(2024, 7, 1)))
+    assert (str(said.verdict), said.standing) == ("In doubt", "bad")
+    assert ("In doubt", "K-1102-2024-06-01, 2024-06-01") in [(str(label), str(text)) for label, text in said.rows]
 
 
 def test_drafts_of_one_recording_count_once(tmp_path: Path) -> None:
