@@ -335,9 +335,7 @@ def overview_of(history: MachineHistory) -> doc.Overview:
     )  # fmt: skip
     ahead = ((one.crossing.quantile(0.5), one) for one in history.values if one.crossing is not None and not one.beyond)
     known = sorted(((when, one) for when, one in ahead if when is not None), key=lambda pair: pair[0])
-    first = [
-        say("{name}: {when}", name=Verbatim(one.series.quantity), when=meets(one, history.on)) for _, one in known[:1]
-    ]
+    first = [say("{name}: {when}", name=Verbatim(v.series.quantity), when=meets(v, history.on)) for _, v in known[:1]]
     return doc.Overview(verdict, standing, doc.facts(
         (say("Last decision"), OUTCOME_WORDS.get(last, Verbatim(last)) if last != NONE else NOTHING),
         (say("In doubt"), semicolons(commas([Verbatim(one.number or one.job), day(one.day)]) for one in doubt)),
