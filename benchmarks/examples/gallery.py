@@ -36,6 +36,7 @@ EXAMPLES = {
     "plate_two_dates": "plate-two-dates-simulated",
     "triangle": "triangle-simulated",
     "sphere": "sphere-simulated",
+    "ring": "ring-simulated",
     "plane": "plane-simulated",
     "digitizer": "digitizer-simulated",
     "scanned_planes": "scanned-planes-simulated",

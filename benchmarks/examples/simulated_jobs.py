@@ -158,6 +158,31 @@ def sphere() -> Simulated:
     )  # fmt: skip
 
 
+def ring() -> Simulated:
+    """A setting ring flat in two places and turned between them, upright in a third; 25 points around, twice each."""
+    turn = 2 * np.pi * (np.arange(25) + 0.5) / 25
+    out = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(25)])
+    ways = (Rotation.identity(), Rotation.identity(), Rotation.from_euler("x", 90, degrees=True))
+    places = MIDDLE + np.array([[0, 0, 0], [220, -260, 90], [-200, 240, -80]])
+    parts = [(place + 25.0 * way.apply(out), -way.apply(out).round(6)) for place, way in zip(places, ways, strict=True)]
+    n = np.vstack([np.tile(each, (2, 1)) for _, each in parts])
+    points = recording(
+        np.vstack([np.tile(xyz, (2, 1)) for xyz, _ in parts]), np.repeat([1, 2, 3], 50), np.tile(np.arange(1, 26), 6),
+        np.tile(np.repeat([1, 2], 25), 3), nx=n[:, 0], ny=n[:, 1], nz=n[:, 2], turned_deg=np.repeat([0.0, 90.0, 0.0], 50),
+        temp_artefact_c=np.full(150, 20.0),
+    )  # fmt: skip
+    truth = {"probe_radius": 0.7, "probe_lobing": (0.5, 0.3), "squareness_xy": 9.0}
+    return Simulated(
+        "ring-simulated", "Setting ring of 50 mm in three places, 25 points around",
+        {"kind": "ring", "name": "Setting ring", "length_mm": 50.0013, "u_um": 0.2, "form_um": 0.2, "cte_per_k": 1.1e-5},
+        points, truth, list(truth), 0.35,
+        extra=_negligible("ring", FORM)
+        + '\n[[conformity]]\nstandard = "laboratory\'s own rule"\ncharacteristic = "roundness"\n'
+        "limit_um = 6.0\ncomplete = { measurements = 3, repeats = 2, points = 25 }\n",
+        columns=("nx", "ny", "nz", "turned_deg", "temp_artefact_c"),
+    )  # fmt: skip
+
+
 def plate() -> Simulated:
     """A plate of 5 × 5 balls flat on the table, and upright along X."""
     steps = 100.0 * np.arange(5)
@@ -428,8 +453,8 @@ def table_spheres() -> Simulated:
 
 
 EXAMPLES = (
-    step_gauge, gauge_blocks, sphere, plate, plate_two_dates, bryan, axis_runs, circles, multilateration, triangle, plane,
-    digitizer, table_spheres,
+    step_gauge, gauge_blocks, sphere, ring, plate, plate_two_dates, bryan, axis_runs, circles, multilateration, triangle,
+    plane, digitizer, table_spheres,
 )  # fmt: skip
 
 

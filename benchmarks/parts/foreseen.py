@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import curved, machines, truth
 from benchmarks.parts.known_noise import joint_posterior
-from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, WORDS, joined, plan
+from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, joined, plan
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise, white
 from cmm_uq.analysis.machine.recordings import FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.regions import with_readings
@@ -28,20 +28,31 @@ from cmm_uq.analysis.parts.causes.surroundings import Surroundings
 from cmm_uq.analysis.parts.foreseen import LEVELS, foreseen_ratios, foretold
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
-from cmm_uq.app.commands.parts.proposals import BALL_MM, BALL_UM, GAUGE_UM, ProposedMeasurement, proposals
+from cmm_uq.app.commands.parts.proposals import (
+    BALL_MM,
+    BALL_UM,
+    GAUGE_UM,
+    RING_UM,
+    ProposedMeasurement,
+    bore_of,
+    proposals,
+)
 from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.artefacts.kinds import SphereFacts
+from cmm_uq.artefacts.spheres.kind import RingFacts
+from cmm_uq.artefacts.spheres.ring import RingGauge
 from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.propagation import Source, simulate
 
 BEGIN, END = "<!-- written by benchmarks.parts.foreseen -->", "<!-- end of foreseen -->"
 SORTS = [
     sort for sort in curved.SORTS if sort.name not in ("ten times better", "ten times worse", "as the priors have it")
 ]
-WAYS = ("dense lines", "lines about the part", "lines through the range", "ball")
+WAYS = ("dense lines", "lines about the part", "lines through the range", "ball", "ring")
 SIGMA = 0.7e-3
 PLAN = replace(plan(), characteristics=tuple(compress(CHARACTERISTICS, foretold(plan()))))
 
@@ -108,37 +119,42 @@ def _measured(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
     known = None if sigma is None else white(sigma)
     first = FurtherRecording(model, own_noise(model, certificate.unmodelled, seed, known))
     found: dict[str, Any] = {"before": before.tolist(), "foretold": {}, "found": {}}
-    for way, one in zip(WAYS, proposals(virtual.places[0].points, PLAN.styli[0]), strict=True):
+    ways = proposals(virtual.places[0].points, PLAN.styli[0], bore=bore_of(PLAN, [1]))
+    for way, one in zip(WAYS, ways, strict=True):
         beside = FurtherRecordings((one.recording(model, state.noise),))
         found["foretold"][way] = np.quantile(
             foreseen_ratios(virtual, how, model, beside, seed), LEVELS, axis=0
         ).tolist()
-        other = RecordingModel(recorded(one, hidden, random), machines.NAMED)
+        other = RecordingModel(recorded(one, hidden, random), (*machines.NAMED, *one.beside))
         taken = further_recording(first, other, certificate.unmodelled, seed, sigma)
         after = given_recording(certificate, model, sigma, machines.TRIALS, seed, beside=FurtherRecordings((taken,)))
         found["found"][way] = (expanded(virtual_of(after)[0])).tolist()
     return found
 
 
-def recorded(one: ProposedMeasurement, hidden: truth.Truth, random: np.random.Generator) -> StepGauge | SphereArtefact:
+def recorded(one: ProposedMeasurement, hidden: truth.Truth, random: np.random.Generator) -> Artefact:
     """A proposal as the machine with the hidden truth reads it: an artefact that is off by as much as its u says."""
     planned = one.artefact.points
     tip = np.array([planned.columns[f"tip_{axis}_mm"][0] for axis in "xyz"])
     approach = np.column_stack([planned.columns[f"approach_{axis}"] for axis in "xyz"])
     xyz = planned.xyz + tip
-    off = float(random.standard_normal())
+    off, ring = float(random.standard_normal()), isinstance(one.artefact, RingGauge)
     if isinstance(one.artefact, StepGauge):
         reference = planned.columns["reference_mm"]
         along = one.artefact.directions(planned.xyz)
         xyz = xyz + (1e-3 * GAUGE_UM * off / reference.max()) * reference[:, None] * along
     else:
-        toward = np.column_stack([planned.columns[f"n{axis}"] for axis in "xyz"])
-        xyz = xyz + 0.5e-3 * BALL_UM * off * toward
+        n = np.column_stack([planned.columns[f"n{axis}"] for axis in "xyz"])
+        xyz = xyz + 0.5e-3 * off * (-RING_UM if ring else BALL_UM) * n
     read = hidden.read(xyz, tip, approach)
+    if ring:  # by a tip that is as wrong as those of parts are
+        read = read + 0.5e-3 * U_TIP_UM * float(random.standard_normal()) * n
     points = planned.at(read + SIGMA * random.standard_normal(read.shape))
     if isinstance(one.artefact, StepGauge):
         longest = float(one.artefact.reference.max())
         return StepGauge(ReferencedFacts(kind="step_gauge", u_um=GAUGE_UM, length_mm=longest), points)
+    if isinstance(one.artefact, RingGauge):
+        return RingGauge(RingFacts(kind="ring", length_mm=one.artefact.sizes[0].nominal, u_um=RING_UM), points)
     return SphereArtefact(SphereFacts(kind="sphere", length_mm=BALL_MM, u_um=BALL_UM), points)
 
 

@@ -39,6 +39,8 @@ from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.app.commands.estimation import doubt_of
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
+from cmm_uq.artefacts.spheres.kind import RingFacts
+from cmm_uq.artefacts.spheres.ring import RingGauge
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
@@ -51,10 +53,14 @@ from cmm_uq.maths.uncertainty.propagation import Source, simulate
 PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
 BEGIN, END = "<!-- written by benchmarks.parts.machines -->", "<!-- end -->"
 TRIALS, PILOT = 10_000, 2000
-NAMED = effects(truth.SIX)
+NAMED, PROBED = effects(truth.SIX), effects(("probe_radius",))
 UNMODELLED = tuple(one for one in unmodelled_errors(truth.SIX, {}) if "time_s" not in one.effect.columns)
 BAR_MM, U_BAR_UM = 400.0, 0.5
 GAUGE_MM, U_GAUGE_UM = 800.0, 0.4
+RING_MM, U_RING_UM, RING_FORM_UM = 30.0, 0.2, 0.2
+RING_AT = np.array(
+    [*truth.CENTRES["h2"], float(np.mean(truth.DEPTHS))]
+)  # beside a bore of its size, in the part's frame
 FACES = {"step gauge": 6, "dense gauge": 41}
 """On each of the seven lines of a gauge."""
 U_TEST_UM, MPE_K = 0.5, 750.0  # of a tested length; mm in which a permissible error grows by itself
@@ -121,10 +127,23 @@ def _nominal() -> Known:
 
 
 def calibrated(
-    cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator, warm: float = 0.0
-) -> Artefact:
-    """The recording of a calibration as the package reads it; ``warm``: relative expansion of the artefact that is left."""
+    cell: Cell, hidden: truth.Truth, sigma: float, offset: float, random: np.random.Generator, warm: float = 0.0,
+    near: np.ndarray | None = None,
+) -> Artefact:  # fmt: skip
+    """The recording of a calibration as the package reads it; ``warm``: relative expansion of the artefact that is left.
+
+    ``near``: place of a ring, mm.
+    """
     repeats = 1 if cell.noise == "stated" else 3
+    if near is not None and cell.artefact == "ring":
+        diameter, larger = (
+            RING_MM + 1e-3 * U_RING_UM * random.standard_normal(),
+            0.5e-3 * U_TIP_UM * random.standard_normal(),
+        )
+        made = truth.ring(hidden, near, diameter, 1e-3 * RING_FORM_UM, larger, repeats, sigma, random)
+        return RingGauge(
+            RingFacts(kind="ring", length_mm=RING_MM, u_um=U_RING_UM, form_um=RING_FORM_UM), as_points(made)
+        )
     if cell.artefact in FACES:
         growth = 1e-3 * U_GAUGE_UM / GAUGE_MM * random.standard_normal() + warm
         made = truth.step_gauge(hidden, growth, repeats, sigma, offset, random, FACES[cell.artefact])
@@ -165,6 +184,7 @@ def on_machine(
     *,
     tested: bool | None = None,
     warm_k: float = 0.0,
+    pose: PartPose | None = None,
 ) -> dict[str, Any]:
     """A machine with a hidden truth, calibrated, corrected, measuring the part.
 
@@ -172,7 +192,7 @@ def on_machine(
     certificates, in order; how probable each is by those before is kept, and one that is not is left out. ``tested``: whether
     a test of lengths that the corrected machine passed is stated besides; ``None`` for no test, which is made else anyhow.
     ``warm_k``: standard uncertainty, as stated, of the temperatures of the artefact in the calibration and of each scale on
-    the day of the part, when these are at 22 °C.
+    the day of the part, when these are at 22 °C. ``pose``: of the part; near its larger bore a ring then stands.
     """
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
@@ -190,8 +210,12 @@ def on_machine(
     known = None if given is None else white(given)
     for artefact in beside:
         first = FurtherRecording(model, own_noise(model, certificate.unmodelled, seed, known))
-        other = RecordingModel(calibrated(replace(cell, artefact=artefact), hidden, sigma, offset, random), NAMED)
-        found = further_recording(first, other, certificate.unmodelled, seed, given)
+        near = None if pose is None else pose.of(RING_AT) + [20, 20, 10] * random.uniform(-1, 1, 3)
+        further = calibrated(replace(cell, artefact=artefact), hidden, sigma, offset, random, near=near)
+        ring = artefact == "ring"
+        other = RecordingModel(further, (*NAMED, *PROBED) if ring else NAMED)
+        doubts = causes_of(further, Circumstances()) if ring else ()
+        found = further_recording(first, other, certificate.unmodelled, seed, given, doubts)
         chances.append(found.contradiction(state))
         if chances[-1] >= CONTRADICTED:
             taken.append(found)
@@ -217,7 +241,7 @@ def on_machine(
         kelvin = SCALE.excess + warm_k * random.standard_normal(3)
         expanded = (SCALE.cte_per_k + cte) * kelvin - SCALE.cte_per_k * SCALE.excess
         today = replace(hidden, scale=hidden.scale + 1e6 * expanded)
-    pose = placed(random)
+    pose = pose or placed(random)
     part = truth.made_part(random, made.place_um, made.form_um)
     measuring = truth.Measuring(today, corrected, pose.rotation, pose.translation_mm, float(np.hypot(sigma, offset)),
                                 1e-3 * U_TIP_UM * float(random.standard_normal()), float(growth))  # fmt: skip

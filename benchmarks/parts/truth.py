@@ -169,6 +169,26 @@ def step_gauge(
     return Recording(xyz, whole["m"], whole["p"], whole["r"], columns)
 
 
+def ring(
+    truth: Truth, middle: np.ndarray, diameter: float, form: float, larger: float, repeats: int, sigma: float,
+    random: np.random.Generator,
+) -> Recording:  # fmt: skip
+    """A ring that lies flat, 25 points around, by a tip whose radius is larger than it is taken for; mm.
+
+    ``form``: range of its radii, all of it in two lobes that lie anyhow.
+    """
+    turn = 2 * np.pi * (np.arange(25) + 0.5) / 25
+    out = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(25)])
+    lobes = 0.5 * form * np.cos(2 * turn + random.uniform(0, 2 * np.pi))
+    centres = middle + (0.5 * diameter + lobes - RADIUS)[:, None] * out
+    shown = truth.read(centres, TIP, np.sign(np.round(out, 6))) + (RADIUS - larger) * out
+    vectors = {"n{}": -out, "approach_{}": np.sign(np.round(out, 6)), "tip_{}_mm": np.tile(TIP, (25, 1))}
+    columns = {name.format(a): np.tile(v[:, i], repeats) for name, v in vectors.items() for i, a in enumerate("xyz")}
+    one, at = np.ones(25 * repeats, dtype=np.int64), np.tile(np.arange(1, 26), repeats)
+    xyz = np.tile(shown, (repeats, 1)) + sigma * random.standard_normal((25 * repeats, 3))
+    return Recording(xyz, one, at, np.repeat(np.arange(1, repeats + 1), 25), columns)
+
+
 def tested_lengths(
     truth: Truth, corrected: Truth, sigma: float, u_um: float, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from cmm_uq.artefacts.axis_runs.kind import APPROACHES, AXIS_RUNS, InterferometerFacts
+from cmm_uq.artefacts.spheres.kind import RING
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import JobTable, Length, Number, Numbers, Position, Triple, Uncertainty, key, required
 from cmm_uq.base.points import AXES
@@ -72,7 +73,6 @@ BRYAN = _kind("bryan", ArtefactFacts, "bryan:Bryan", Beginning(
     artefact={"name": "Swept bar", "length_mm": 250.0, "u_um": 0.5}, plan={"repeats": 1},
     conformity=_own_rule("span", 10.0, 25, 1, 1), test=circumstances(u_repeat_um=0.1), recorded=AT_20_C,
 ), "error", *SWEPT)  # fmt: skip
-
 
 # of what nothing but the lengths of the artefact is in doubt
 _OF_LENGTHS = circumstances(u_cte_per_k=1e-6, u_temperature_k=0.1, u_alignment_um=0.1, u_fixturing_um=0.1)
@@ -396,5 +396,5 @@ TABLE_SPHERES = Kind(
 )  # fmt: skip
 BUILT_IN = {kind.name: kind for kind in (
     BALLBAR, BRYAN, STEP_GAUGE, GAUGE_BLOCKS, PLATE, TRIANGLE, SPHERE, PLANE, SHIFT, ERROR_MAP, DIGITIZER, AXIS_RUNS,
-    MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS, TABLE_SPHERES, SEAT,
+    MULTILATERATION, SCANNED_PLANES, TRACKED_POINTS, TABLE_SPHERES, SEAT, RING,
 )}  # fmt: skip

@@ -57,7 +57,7 @@ COLUMNS: Mapping[str, str] = MappingProxyType({
     **{f"since_reversal_{a}_mm": f"Way of carriage {a} since it last turned round." for a in AXES},
     "gamma_deg": "Turn of the digitizer about its own axis.",
     "depth_mm": "Scan depth of the point, along the digitizer's line of sight.",
-    "turned_deg": "By how much a sphere was turned about Z against its first set-up: what turns with it is its own form.",
+    "turned_deg": "By how much a sphere was turned about Z, a ring about its axis, against its first set-up: its form shows.",
     **{f"tip_{a}_mm": f"Offset of the stylus tip from the end of the ram, along {a}." for a in AXES},
     **{f"{a}_deg": f"Reading of the rotary axis {a.upper()}, where the machine's chain has one." for a in ROTARY},
     **{f"{a}_approach": f"How the rotary axis {a.upper()} turned into the point: −1, 0 or +1." for a in ROTARY},

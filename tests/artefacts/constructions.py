@@ -67,6 +67,23 @@ def spheres(places: int = 4, diameter: float = 25.0, *, normals: bool = True) ->
     return recording(xyz, np.repeat(np.arange(1, places + 1), 25), np.tile(np.arange(1, 26), places), **columns)
 
 
+TILTS = ((0.0, 0.0, 0.0), (90.0, 0.0, 20.0), (35.0, -50.0, 10.0))
+
+
+def rings(heights: tuple[float, ...] = (0.0,), *, count: int = 24, normals: bool = True, places: int = 3) -> Points:
+    """Rings of 50 mm that lie flat, stand, and stand askew, with points around at some heights."""
+    turn = 2 * np.pi * (np.arange(count) + 0.3) / count
+    out = np.tile(np.column_stack([np.cos(turn), np.sin(turn), np.zeros(count)]), (len(heights), 1))
+    body = 25.0 * out + np.repeat(heights, count)[:, None] * [0.0, 0.0, 1.0]
+    ways = [Rotation.from_euler("xyz", angles, degrees=True) for angles in TILTS[:places]]
+    xyz = np.vstack([MIDDLE + np.array([30.0, -80.0, 20.0]) * i + way.apply(body) for i, way in enumerate(ways)])
+    n = -np.vstack([way.apply(out) for way in ways])
+    columns = {f"n{a}": n[:, i] for i, a in enumerate("xyz")} if normals else {}
+    return recording(
+        xyz, np.repeat(np.arange(places) + 1, len(out)), np.tile(np.arange(len(out)) + 1, places), **columns
+    )
+
+
 FLAT = (0.0, 0.0, 0.0)
 FOUR_ATTITUDES = (FLAT, (90.0, 0.0, 0.0), (0.0, -90.0, 0.0), (45.0, 10.0, 5.0))
 

@@ -196,6 +196,7 @@ RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Contributions to the deviation of one length": lambda r: [[line] for line in r["length_budget"]["budget"]],
     "Each line by itself, at 20 °C": lambda r: [[line] for line in r["lines"]],
     "Flatness as recorded": lambda r: [[plane] for plane in r["planes"]],
+    **{name: lambda r: [[ring] for ring in r["rings"]] for name in ("Diameter and roundness", "Roundness by lobes")},
     "Surface, compensated for the probe's offset": surfaces,
     "Deviation of a coordinate": lambda r: [[placing] for placing in r["placings"]],
     "Probing errors": lambda r: [[sphere] for sphere in r["spheres"]],

@@ -39,7 +39,7 @@ EXAMPLE = {
     "triangle": "triangle-simulated", "sphere": "sphere-simulated", "plane": "plane-simulated",
     "digitizer": "digitizer-simulated", "axis_runs": "axis-runs-simulated", "multilateration": "multilateration-simulated",
     "scanned_planes": "scanned-planes-simulated", "tracked_points": "robot-simulated",
-    "table_spheres": "table-spheres-simulated", "seat": "arm-seat-simulated",
+    "table_spheres": "table-spheres-simulated", "seat": "arm-seat-simulated", "ring": "ring-simulated",
 }  # fmt: skip
 OUTSIDE = "tracker_length"
 PLUGINS = {OUTSIDE: {"outside-kinds": "0.1.0"}}
@@ -183,7 +183,8 @@ def spoilt(name: str, how: str, to: Path) -> Path:
 
 SPOILT = [
     *((name, "in one place") for name in EXAMPLE if name not in ("error_map", "tracked_points")),
-    *((name, "in inches") for name in ("ballbar", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "digitizer")),
+    *((name, "in inches") for name in ("ballbar", "step_gauge", "gauge_blocks", "plate", "triangle", "sphere", "ring")),
+    ("digitizer", "in inches"),
     ("plane", "without direction points"),
 ]  # fmt: skip
 

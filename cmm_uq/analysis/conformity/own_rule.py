@@ -69,6 +69,7 @@ FIGURES: Mapping[str, tuple[Text, Text, tuple[str, ...]]] = {
         say("distances"), REPEAT_LINES,
     ),
     "flatness": (say("flatness, worst against its limit"), say("planes"), FORM_LINES),
+    "roundness": (say("roundness, worst against its limit"), say("rings"), FORM_LINES),
     "closure": (
         say("distance of the sphere's centre in one attitude from that of all, worst against its limit"),
         say("distances"), REPEAT_LINES,

@@ -6,7 +6,6 @@ A sphere without a certified diameter cannot tell an error of the effective styl
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -18,9 +17,8 @@ from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening import shape
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import SphereFacts
-from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Number, Text, number, say
-from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Plot, Section, Table, columns, figure_columns
 from cmm_uq.certificate.plots.residuals import deviations_plot, volume_plot
@@ -28,19 +26,15 @@ from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.wording import numbered
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
-from cmm_uq.machine.model.artefact import ArtefactFigure, Forms, Placings
+from cmm_uq.machine.model.artefact import ArtefactFigure, Forms, Placings, Size
 from cmm_uq.machine.model.artefact_doubt import form_faults
 from cmm_uq.machine.model.placed import Radial
-from cmm_uq.machine.model.recorded import expansion, place
+from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_states import HARMONICS, harmonics, turned_back
 from cmm_uq.maths.geometry import fit_sphere
 from cmm_uq.maths.geometry.enclosing import enclosing_diameter
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
-
-# between a recorded normal and the direction away from the centre; beyond it the normals belong to something else
-LARGEST_ANGLE = np.radians(20.0)
-
 
 _OF_FORM = (*HARMONICS, *((6, order) for order in range(-6, 7)))  # probes have two to six lobes
 
@@ -63,9 +57,7 @@ class SphereArtefact(Radial):
         super().__init__(facts, points, Placings.of(points.measurement), expansion(facts, points), where)
         self._facts = facts
         self.form = (facts.form_um or 0.0) * MICROMETRE
-        if all(f"n{a}" in points.columns for a in AXES):
-            self._take_normals(where)
-
+        self.take_normals(where)
         if not self.form:
             self.exact = ((say("The form of the sphere is not stated"), np.ones(len(points), dtype=bool)),)
 
@@ -101,21 +93,6 @@ class SphereArtefact(Radial):
         values = np.array([enclosing_diameter(centres[groups]) for groups in each])
         return {"L_Dia": ArtefactFigure(values, rows, np.full(len(each), self.sizes[0].nominal))}
 
-    def _take_normals(self, where: str | None) -> None:
-        """Normals as recorded, brought to unit length: the probe's errors act along them, and so they are seen exactly."""
-        normals = np.column_stack([self.points.columns[f"n{a}"] for a in AXES])
-        length = np.linalg.norm(normals, axis=1)
-        geometric = self.directions(self.points.xyz)
-        wrong = np.einsum("ni,ni->n", normals, geometric) < length * np.cos(LARGEST_ANGLE)
-        if np.any(rows := wrong | (length == 0)):
-            inward = np.all(np.einsum("ni,ni->n", normals, geometric) < 0)
-            problem = "nx, ny, nz point into the sphere" if inward else "nx, ny, nz does not point away from the centre"
-            fix = "Give the outward normal at each probed point" + (": turn all signs round" if inward else "")
-            raise CmmUqError(problem, where=place(self.points, rows, where), fix=fix)
-        self._normals = normals / length[:, None]
-        columns = {f"n{a}": self._normals[:, i] for i, a in enumerate(AXES)}
-        self.points = replace(self.points, columns={**self.points.columns, **columns})
-
 
 _NORMAL = 0.4  # part of the radius by which a recorded normal may miss the point: normals may be nominal, 20° off
 _NORMALS = tuple(f"n{a}" for a in AXES)
@@ -130,10 +107,10 @@ def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
     if not all(name in points.columns for name in _NORMALS):
         return ArtefactShape(rows, shape.ball_misfit, radius, extent, False, (), shape.no_references(points))
     normals = np.column_stack([points.columns[name] for name in _NORMALS])
-    return ArtefactShape(rows, _ball_with_normals, radius, extent, False, _NORMALS, normals)
+    return ArtefactShape(rows, ball_with_normals, radius, extent, False, _NORMALS, normals)
 
 
-def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
+def ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
     """Each normal says where the centre lies; their median does not follow a few."""
     if np.isnan(radius):
         i, j = shape.samples_of(len(xyz), 2).T
@@ -196,43 +173,66 @@ def sections(result: Result) -> list[Section]:
 
 
 def _table(result: Result, sphere: SphereArtefact) -> Table:
-    forms, size, noise = sphere.forms(), sphere.sizes[0], result.noise.expanded
-    repeated, least = forms.repeat.max() > 1, max(sphere.form / MICROMETRE, noise / 10)
+    forms, size = sphere.forms(), sphere.sizes[0]
+    errors = [say("Form error")]
+    notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
+    if size.certified:
+        errors.append(say("Size error"))
+        what = say(
+            "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
+            u=u_of_size(size),
+        )
+        notes.append(what)
+    heads = columns([say("Sphere"), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm"))])
+    return Table(say("Probing errors"), heads, probing_rows(result, forms), tuple(notes))
+
+
+def u_of_size(size: Size) -> Number:
+    return rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
+
+
+def probing_rows(result: Result, forms: Forms) -> tuple[tuple[Text, ...], ...]:
+    """Of everything probed its number, how many points, its form and, where it is certified, the error of its size, µm."""
+    noise = result.noise.expanded
+    repeated, least = forms.repeat.max() > 1, max(forms.certified / MICROMETRE, noise / 10)
     rows: list[tuple[Text, ...]] = []
     for i, measurement in enumerate(forms.measurement):
         place = numbered(measurement, forms.repeat[i] if repeated else None)
         error = () if forms.size is None else (rounded(float(forms.size[i]) / MICROMETRE, noise)[0],)
         rows.append((place, number(forms.count[i]), rounded(float(forms.form[i]) / MICROMETRE, least)[0], *error))
-    errors = [say("Form error")]
-    notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
-    if size.certified:
-        errors.append(say("Size error"))
-        u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
-        what = say(
-            "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).", u=u
-        )
-        notes.append(what)
-    heads = columns([say("Sphere"), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm"))])
-    return Table(say("Probing errors"), heads, tuple(rows), tuple(notes))
+    return tuple(rows)
 
 
 def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
     """Distance of each point from its best centre minus the certified or mean radius."""
-    size, xyz = sphere.sizes[0], sphere.points.xyz
-    radius = size.nominal * sphere.per_size * sphere.expansion
-    deviations = np.asarray((sphere.distances(xyz, None) - radius) / MICROMETRE, dtype=np.float64)
-    name = say("certified radius") if size.certified else say("mean radius")
-    what = say("{count} points: as recorded they deviate", count=len(deviations))
     caption = say(
         "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = {k}).",
-        name=name,
+        name=radius_words(sphere),
         k=number(result.noise.coverage_factor, ".2f"),
     )
+    return radial_plot(result, sphere, caption, say("Point on the sphere"), sphere.points.point)
+
+
+def radius_words(artefact: Radial) -> Text:
+    return say("certified radius") if artefact.sizes[0].certified else say("mean radius")
+
+
+def radial_plot(result: Result, artefact: Radial, caption: Text, label: Text, position: Floats | Ints) -> Plot:
+    size, xyz, name = artefact.sizes[0], artefact.points.xyz, radius_words(artefact)
+    radius = size.nominal * artefact.per_size * artefact.expansion
+    deviations = np.asarray((artefact.distances(xyz, None) - radius) / MICROMETRE, dtype=np.float64)
+    what = say("{count} points: as recorded they deviate", count=len(deviations))
     return deviations_plot(
-        result, deviations, what, say("from the {name}", name=name), position=sphere.points.point, reference=name,
+        result,
+        deviations,
+        what,
+        say("from the {name}", name=name),
+        position=position,
+        reference=name,
         reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0,
-        position_label=say("Point on the sphere"), caption=caption,
-    )  # fmt: skip
+        position_label=label,
+        caption=caption,
+    )
 
 
 def _over(result: Result, sphere: SphereArtefact) -> Plot:

@@ -316,15 +316,18 @@ def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:
     return next(iter(temperatures(own, _TEMPERATURE)))
 
 
-def form_faults(facts: ArtefactFacts, form_um: float | None, points: Points) -> Iterable[Effect]:
-    """That a sphere is not round.
+def form_faults(
+    facts: ArtefactFacts, form_um: float | None, points: Points, lobes: OwnFault | None = LOBES, form: OwnFault = FORM
+) -> Iterable[Effect]:
+    """That a sphere is not round, or a ring.
 
     ``form_um``: form deviation by its certificate, µm, which is about four standard deviations of it.
     """
     um = _UNKNOWN_FORM_UM if form_um is None else max(form_um, _LEAST_FORM_UM) / _FORM
     own = FaultyArtefact(Body.of(points, points.xyz), points, um, _ROUND, 3, expansion_of(facts))
-    yield LOBES.made(own)
-    yield FORM.made(replace(own, size=um / len(FORM.made(own).coefficients) ** 0.5))
+    if lobes is not None:
+        yield lobes.made(own)
+    yield form.made(replace(own, size=um / len(form.made(own).coefficients) ** 0.5))
 
 
 def expansion_of(facts: ArtefactFacts) -> float:

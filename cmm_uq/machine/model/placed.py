@@ -7,6 +7,7 @@ distance between points with the covariance that follows from shared points, wit
 from __future__ import annotations
 
 from abc import abstractmethod
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -19,9 +20,12 @@ from cmm_uq.base.units import unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import length_of, place
+from cmm_uq.machine.physics.effects.own_states import NORMAL
 from cmm_uq.maths.geometry.feature import nearest_rotations
 from cmm_uq.maths.inference.linear_model import Freedoms
 
+# between a recorded normal and the direction away from the centre; beyond it the normals belong to something else
+LARGEST_ANGLE = np.radians(20.0)
 LEAST_POINTS = 4  # points that a centre and a distance need, not all in one plane
 _FLAT = 1e-3  # extent across a plane over the extent in it below which the side that the centre lies on is a guess
 
@@ -34,6 +38,9 @@ class Radial(Artefact):
     size_title: ClassVar[Text]
     size_what: ClassVar[Text]
     plural: ClassVar[str]  # what is measured, for messages
+    outward: float = 1.0  # sense of a normal out of the material along that away from the centre
+    # what normals of the wrong sense point into, where right ones point, and what else may be wrong
+    normal_words: ClassVar[tuple[str, str, str]] = ("the sphere", "away from the centre", "")
 
     def __init__(
         self, facts: ArtefactFacts, points: Points, centred: Placings, expansion: Floats, where: str | None
@@ -47,7 +54,7 @@ class Radial(Artefact):
         self.sizes = (Size("length_mm", self.size_title, unit("mm"), length, sd, self.size_what),)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        away = true_xyz - self.centres(true_xyz, sizes[0])[self.centred.index]
+        away = self.away(true_xyz, sizes[0])
         squares = np.einsum("ni,ni->n", away, away)
         directions = away / np.sqrt(squares)[:, None] if self._normals is None else self._normals
         along = np.einsum("ni,ni->n", away, directions)
@@ -68,13 +75,16 @@ class Radial(Artefact):
         """Outward unit normals, (n, 3): as recorded, or from the centre."""
         if self._normals is not None:
             return self._normals
-        away = xyz - self.centres(xyz, None)[self.centred.index]
+        away = self.away(xyz, None)
         return np.asarray(away / np.linalg.norm(away, axis=1, keepdims=True), dtype=np.float64)
 
     def distances(self, xyz: Floats, size: float | None) -> Floats:
         """Distance of every point from its centre, (n,) mm; see :meth:`centres` for ``size``."""
-        away = xyz - self.centres(xyz, size)[self.centred.index]
-        return np.asarray(np.linalg.norm(away, axis=1), dtype=np.float64)
+        return np.asarray(np.linalg.norm(self.away(xyz, size), axis=1), dtype=np.float64)
+
+    def away(self, xyz: Floats, size: float | None) -> Floats:
+        """Of every point from its centre, (n, 3) mm."""
+        return np.asarray(xyz - self.centres(xyz, size)[self.centred.index])
 
     def centres(self, xyz: Floats, size: float | None) -> Floats:
         """Centres (q, 3), mm, of the points (n, 3) nearest to the distance that ``size`` says.
@@ -104,6 +114,25 @@ class Radial(Artefact):
             if np.abs(step).max(initial=0.0) < 1e-12 * radii.max():
                 break
         return offset
+
+    def take_normals(self, where: str | None) -> None:
+        """Normals as recorded, brought to unit length: the probe's errors act along them, and so they are seen exactly."""
+        if not all(name in self.points.columns for name in NORMAL):
+            return
+        normals = np.column_stack([self.points.columns[name] for name in NORMAL])
+        length = np.linalg.norm(normals, axis=1)
+        along = self.outward * np.einsum("ni,ni->n", normals, self.directions(self.points.xyz))
+        if np.any(rows := (along < length * np.cos(LARGEST_ANGLE)) | (length == 0)):
+            inward, (into, off, else_) = np.all(along < 0), self.normal_words
+            problem = f"nx, ny, nz point into {into}" if inward else f"nx, ny, nz does not point {off}"
+            fix = "Give the outward normal at each probed point" + (f": turn all signs round{else_}" if inward else "")
+            raise CmmUqError(problem, where=place(self.points, rows, where), fix=fix)
+        normals = normals / length[:, None]
+        columns = {name: normals[:, i] for i, name in enumerate(NORMAL)}
+        self._normals, self.points = (
+            self.outward * normals,
+            replace(self.points, columns={**self.points.columns, **columns}),
+        )
 
     def _radii(self, size: float) -> Floats:
         return np.asarray(self.per_size * size * self.expansion, dtype=np.float64)

@@ -13,6 +13,7 @@ from cmm_uq.artefacts.bryan import Bryan
 from cmm_uq.artefacts.digitizer import THREE, DigitizerArtefact
 from cmm_uq.artefacts.plane import PlaneSurface
 from cmm_uq.artefacts.shift.result import ShiftedReadings
+from cmm_uq.artefacts.spheres.ring import RingGauge
 from cmm_uq.artefacts.triangle import Triangle, corners
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.conformity import Circumstances, TestUncertainty
@@ -204,6 +205,19 @@ def surface(how: str) -> Made:
     )
 
 
+def ring(how: str) -> Made:
+    """Twenty-five points around a ring that lies flat, one of them 6 µm too far out."""
+    turn = 2 * np.pi * np.arange(25) / 25
+    radii = 25.0 + 6e-3 * (np.arange(25) == 7)
+    one = np.column_stack([300 + radii * np.cos(turn), 250 + radii * np.sin(turn), np.full(25, -200.0)])
+    points = numbered(np.tile(one, (2, 1)) + 1e-6 * (np.arange(50) >= 25)[:, None], how, 1, 25)
+    fit = least_squares(lambda p: np.linalg.norm(one[:, :2] - p[:2], axis=1) - p[2], [300.0, 250.0, 25.0], xtol=1e-15)
+    facts = artefact_facts(kind="ring", length_mm=50.0, u_um=0.1, form_um=None if how == "no u" else 0.2)
+    under = replace(STATED, uncertainty=TestUncertainty(u_form_um=0.0 if how == "no u" else 1e-6))
+    complete = CompleteTest(measurements=2, repeats=1, points=25)
+    return RingGauge(facts, points), under, 1e3 * float(np.ptp(fit.fun)), 0.1, False, complete
+
+
 def attitudes(how: str) -> Made:
     """The sphere's centre in five attitudes, of which one is 20 µm off."""
     angles = np.array([*THREE, (180.0, 90.0, 90.0), (0.0, 45.0, 30.0)])
@@ -257,6 +271,7 @@ OWN: Mapping[str, Callable[[str], Made]] = {
                                        "pivot offset")},
     **{name: triangle(name) for name in ("mean error", "standard deviation of errors", "angle error", "repeatability")},
     "flatness": surface,
+    "roundness": ring,
     "closure": attitudes,
     "linearity": curve,
     "straightness": of_plane("straightness", 4.0, 0.1),

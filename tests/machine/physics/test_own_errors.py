@@ -16,7 +16,7 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import EVERY, OWN, effects
 from cmm_uq.machine.physics.effect import CommonSize, Effect
 from cmm_uq.machine.physics.effects.own_errors import GEOMETRY
-from tests.artefacts.constructions import MIDDLE, plate, recording, spheres, step_gauge, swept
+from tests.artefacts.constructions import MIDDLE, plate, recording, rings, spheres, step_gauge, swept
 from tests.recordings import bar_facts, bars, with_columns
 
 DRILLED = artefact_facts(kind="plate", nominal=True, cte_per_k=10e-6)
@@ -149,6 +149,27 @@ def test_harmonics_of_a_sphere_have_a_mean_square_of_one_and_no_part_of_size_and
     np.testing.assert_allclose(np.column_stack([np.ones(len(n)), n]).T @ (W[:, None] * heights), 0, atol=1e-12)
 
 
+def test_lobes_of_a_ring_turn_with_it_and_have_a_mean_square_of_one() -> None:
+    """A standing ring, axis along Y: angles from X towards −Z about it; two to six lobes written out."""
+    turn = 2 * np.pi * (np.arange(48) % 24 + 0.4) / 24
+    n = -np.column_stack([np.cos(turn), np.zeros(48), -np.sin(turn)])
+    by = {f"n{a}": n[:, i] for i, a in enumerate("xyz")}
+    points = recording(
+        MIDDLE - 25.0 * n,
+        np.repeat([1, 2], 24),
+        np.tile(np.arange(24) + 1, 2),
+        turned_deg=np.repeat([0.0, 40.0], 24),
+        **by,
+    )
+    effect = of("artefact_roundness", artefact_of(artefact_facts(kind="ring", length_mm=50.0, form_um=0.4), points))
+    assert effect.coefficients[0].prior_sd == pytest.approx(0.1 / np.sqrt(10))
+    angle = np.arctan2(-n[:, 2] * -1.0, n[:, 0]) * -1.0 - np.radians(points.columns["turned_deg"])
+    waves = [np.sqrt(2) * f(k * angle) for k in range(2, 7) for f in (np.cos, np.sin)]
+    shown = -1e3 * np.einsum("ni,nik->nk", n, effect.basis(points))
+    np.testing.assert_allclose(shown, np.column_stack(waves), atol=1e-12)
+    np.testing.assert_allclose(shown[:24].T @ shown[:24] / 24, np.eye(10), atol=1e-12)
+
+
 def test_a_gauges_pattern_goes_along_its_line() -> None:
     gauge = artefact_of(
         artefact_facts(kind="step_gauge"), points := step_gauge(faces=np.array([0.0, 100, 180, 300, 420]))
@@ -163,11 +184,9 @@ def test_a_gauges_pattern_goes_along_its_line() -> None:
 
 @pytest.mark.parametrize("name", [name for name, effect in OWN.items() if isinstance(effect, CommonSize)])
 def test_a_truth_of_a_common_size_is_drawn_with_exactly_that_size_by_its_seed(name: str) -> None:
-    artefact = (
-        artefact_of(DRILLED, PLATE)
-        if name != "artefact_form"
-        else artefact_of(artefact_facts(kind="sphere"), spheres(2))
-    )
+    own = {"artefact_form": ("sphere", spheres(2)), "artefact_roundness": ("ring", rings())}
+    kind, points = own.get(name, ("", PLATE))
+    artefact = artefact_of(artefact_facts(kind=kind) if kind else DRILLED, points)
     effect = of(name, artefact)
     size = effect.reported[0].name
     one, again, other = (effect.from_reported({size: 4.0, "seed": seed})[0] for seed in (1.0, 1.0, 2.0))

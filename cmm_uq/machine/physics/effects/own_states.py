@@ -1,4 +1,4 @@
-"""Faults of an artefact by how it was kept, laid and held: its temperature, bending, fixture; and the form of a sphere."""
+"""Faults of an artefact by how it was kept, laid and held: temperature, bending, fixture; and the form of a sphere or ring."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cmm_uq.machine.physics.effects.own_errors import FaultyArtefact, OwnFault, 
 from cmm_uq.maths.geometry.feature import frame_about, upward
 
 KELVIN = Parameter("k", unit("K"), 1.0)
-TURNED = "turned_deg"  # column: by how much a sphere was turned about Z against its first set-up
+TURNED = "turned_deg"  # column: by how much a sphere (about Z) or ring was turned against its first set-up
 # degrees and orders of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1
 HARMONICS = tuple((degree, order) for degree in (2, 3, 4, 5) for order in range(-degree, degree + 1))
 NORMAL = ("nx", "ny", "nz")
@@ -188,6 +188,58 @@ class OwnForm(OwnFault, OfDirections):
         return -MICROMETRE * normals[:, :, None] * harmonics(normals, turned_back(points))[:, None, :]
 
 
+ROUNDNESS = (
+    2,
+    3,
+    4,
+    5,
+    6,
+)  # lobes of a ring's form and of probes: the size and the place of a ring are those of 0 and 1
+
+
+class OwnRoundness(OwnFault, OfDirections):
+    """The ring itself is not round: two to six lobes, which turn with it."""
+
+    name, title = "artefact_roundness", say("Roundness of the ring itself")
+    formula = (
+        "e = −Σ √2·(a_k·cos kθ + b_k·sin kθ)·n, k = 2 … 6, θ about the ring's axis less how far the ring was turned"
+    )
+    points_to = say(
+        "the ring's form deviates: turn it about its axis and probe it again; what turns with it is its own"
+    )
+    coefficients = (Parameter("um", unit("µm"), 1.0),)
+    size = Parameter("rms_um", unit("µm"), 1.0)
+    columns = NORMAL
+
+    def belongs_to(self, points: Points) -> bool:
+        return self.owner is not None
+
+    def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
+        return tuple(Parameter(f"{part}{k}_um", unit("µm"), owner.size) for k in ROUNDNESS for part in "ab")
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        self.whose()
+        normals = normals_of(points)
+        lobes = lobes_about(about_axis(normals, points.measurement) - turned_back(points))
+        return -MICROMETRE * normals[:, :, None] * lobes[:, None, :]
+
+
+def about_axis(directions: Floats, measurement: Ints) -> Floats:
+    """Angles (n,), rad, of directions (n, 3) about the axis across those of each measurement; from X about Z."""
+    found = np.empty(len(directions))
+    for number in np.unique(measurement):
+        own = measurement == number
+        u, v, _ = frame_about(upward(np.linalg.svd(directions[own].T @ directions[own])[2][2]))
+        found[own] = np.arctan2(directions[own] @ v, directions[own] @ u)
+    return found
+
+
+def lobes_about(angle: Floats) -> Floats:
+    """Cosine and sine (n, 10) of each number of lobes, of mean square one over a turn."""
+    each = np.multiply.outer(angle, ROUNDNESS)
+    return np.asarray(np.sqrt(2.0) * np.stack([np.cos(each), np.sin(each)], axis=2).reshape(len(angle), -1))
+
+
 def harmonics(normals: Floats, turned: Floats | float, of: Sequence[tuple[int, int]] = HARMONICS) -> Floats:
     """Of directions (n, 3), turned back about Z by angles, rad: degrees and orders (k,) as (n, k), of mean square one."""
     azimuth, found = np.arctan2(normals[:, 1], normals[:, 0]) - turned, []
@@ -222,5 +274,5 @@ def turned_back(points: Points) -> Floats:
 
 TEMPERATURE, SET_UP_TEMPERATURE = ArtefactTemperature(), SetUpTemperature()
 BENDING, FIXTURE = ArtefactBending(), ArtefactFixture()
-LOBES, FORM = OwnLobes(), OwnForm()
-EFFECTS: tuple[Effect, ...] = (TEMPERATURE, SET_UP_TEMPERATURE, BENDING, FIXTURE, LOBES, FORM)
+LOBES, FORM, OUT_OF_ROUND = OwnLobes(), OwnForm(), OwnRoundness()
+EFFECTS: tuple[Effect, ...] = (TEMPERATURE, SET_UP_TEMPERATURE, BENDING, FIXTURE, LOBES, FORM, OUT_OF_ROUND)
