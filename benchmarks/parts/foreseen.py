@@ -137,7 +137,7 @@ def recorded(one: ProposedMeasurement, hidden: truth.Truth, random: np.random.Ge
     planned = one.artefact.points
     tip = np.array([planned.columns[f"tip_{axis}_mm"][0] for axis in "xyz"])
     approach = np.column_stack([planned.columns[f"approach_{axis}"] for axis in "xyz"])
-    xyz = planned.xyz + tip
+    xyz = planned.xyz
     off, ring = float(random.standard_normal()), isinstance(one.artefact, RingGauge)
     if isinstance(one.artefact, StepGauge):
         reference = planned.columns["reference_mm"]
@@ -149,7 +149,7 @@ def recorded(one: ProposedMeasurement, hidden: truth.Truth, random: np.random.Ge
     read = hidden.read(xyz, tip, approach)
     if ring:  # by a tip that is as wrong as those of parts are
         read = read + 0.5e-3 * U_TIP_UM * float(random.standard_normal()) * n
-    points = planned.at(read + SIGMA * random.standard_normal(read.shape))
+    points = planned.at(read + tip + SIGMA * random.standard_normal(read.shape))
     if isinstance(one.artefact, StepGauge):
         longest = float(one.artefact.reference.max())
         return StepGauge(ReferencedFacts(kind="step_gauge", u_um=GAUGE_UM, length_mm=longest), points)

@@ -26,9 +26,9 @@ from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.measurement import RecordingModel
-from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_states import NORMAL
+from cmm_uq.machine.physics.effects.probing import RADIUS
 from cmm_uq.maths.geometry.feature import frame_about
 
 # standard uncertainties of a gauge's length, of a ball's and of a ring's diameter
@@ -158,7 +158,8 @@ def _ring(part: Points, stylus: Stylus, bore: Bore) -> ProposedMeasurement:
     normals = np.column_stack([part.columns[name][bore.rows] for name in NORMAL])
     read, (u, v, _) = part.carriages[bore.rows], frame_about(np.linalg.svd(normals.T @ normals)[2][2])
     plug = bool(np.sum((read - read.mean(axis=0)) * normals) > 0)
-    middle = np.mean(read + (-0.5 if plug else 0.5) * bore.diameter_mm * normals, axis=0)
+    away = (-0.5 if plug else 0.5) * bore.diameter_mm - 0.5 * stylus.diameter_mm  # from the centre of the tip
+    middle = np.mean(read + away * normals, axis=0)
     out = around() @ np.array([u, v])
     n, ones = (out if plug else -out), np.ones(len(out), dtype=np.int64)
     columns = {**_probed(stylus, len(out)), **_along("n", n), **_along("approach_", -np.sign(np.round(n, 6)))}
@@ -177,11 +178,12 @@ def _ring(part: Points, stylus: Stylus, bore: Bore) -> ProposedMeasurement:
         u=u,
         count=len(out),
     )
-    return ProposedMeasurement(of_shaft if plug else of_bore, RingGauge(facts, points), effects(("probe_radius",)))
+    return ProposedMeasurement(of_shaft if plug else of_bore, RingGauge(facts, points), (RADIUS,))
 
 
 def _points(part: Points, read: Floats, number_: Ints, point: Ints, columns: dict[str, Floats]) -> Points:
     xyz = part.machine.coordinates(read)
+    xyz = xyz + read - part.machine.readings(xyz, columns)  # of the tip, which is not where the ram reads
     return Points(xyz, number_, point, np.ones_like(point), part.machine, columns)
 
 

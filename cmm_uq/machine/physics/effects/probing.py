@@ -182,7 +182,7 @@ def _askew(points: Points, _: str, __: str, ___: Sequence[float]) -> Floats:
 _ABOUT = tuple(
     Parameter(f"about_{a}_arcsec", unit("″"), 20.0, say("about {axis}", axis=Verbatim(a.upper()))) for a in AXES
 )
-_RADIUS, *_FURTHER, _HEAD = (row.of() for row in (
+RADIUS, *_FURTHER, _HEAD = (row.of() for row in (
     Law("probe_radius", "Error of the effective stylus radius", say("Effective stylus radius"),
         "true surface point = indicated + r·n", "probe",
         say("the effective stylus radius is wrong: qualify the probe again"), (Parameter("um", unit("µm"), 10.0),),
@@ -240,6 +240,6 @@ _RADIUS, *_FURTHER, _HEAD = (row.of() for row in (
             "qualify every stylus again"), _ABOUT, _turning, TIP, FURTHER),
 ))  # fmt: skip
 EFFECTS: tuple[Effect, ...] = (
-    _RADIUS, ProbeLobing(), ArtefactSag(), *_FURTHER, *(ProbeLobing(count) for count in (2, 4, 6)), ProbeMap(), _HEAD,
+    RADIUS, ProbeLobing(), ArtefactSag(), *_FURTHER, *(ProbeLobing(count) for count in (2, 4, 6)), ProbeMap(), _HEAD,
 )  # fmt: skip
 OF_ANY_TIP = tuple(effect for effect in EFFECTS if effect.name in ("probe_radius", "pre_travel"))  # whatever carries it

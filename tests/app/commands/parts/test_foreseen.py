@@ -13,7 +13,7 @@ import pytest
 
 from cmm_uq.analysis.parts.foreseen import foreseen_measurement, foretold
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
-from cmm_uq.app.commands.parts.proposals import foresee, proposals
+from cmm_uq.app.commands.parts.proposals import bore_of, foresee, proposals
 from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
@@ -47,6 +47,25 @@ def test_what_is_undecided_is_told_what_would_bring_its_uncertainty_down(found: 
     table = foreseen_table(found)
     assert table is not None
     assert len([row for row in table.rows if row[1]]) == 4
+
+
+def test_a_ring_of_the_size_of_a_bore_is_among_them_in_its_place(found: PartMeasurement) -> None:
+    """The bore whose size is asked for, by hand: its middle as the scales read it, its axis, probed from inside."""
+    bore = bore_of(found.plan, found.too_uncertain)
+    assert bore is not None
+    feature = next(one for one in found.plan.features if one.nominal.diameter_mm == bore.diameter_mm)
+    assert [way.name for way in found.foreseen][-1].startswith("calibrated ring of")
+    read = found.virtual.places[0].points.carriages[found.plan.rows[feature.name]]
+    (*_, ring) = proposals(found.virtual.places[0].points, found.plan.styli[0], bore=bore)
+    points = ring.artefact.points
+    assert ring.artefact.sizes[0].nominal == bore.diameter_mm
+    assert [effect.name for effect in ring.beside] == ["probe_radius"]
+    np.testing.assert_allclose(points.carriages.mean(axis=0), read.mean(axis=0), atol=0.01)
+    away = points.xyz - points.xyz.mean(axis=0)
+    np.testing.assert_allclose(np.linalg.norm(away, axis=1), bore.diameter_mm / 2)
+    normals = np.column_stack([points.columns[f"n{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(normals, -away / np.linalg.norm(away, axis=1, keepdims=True), atol=1e-9)
+    assert all(np.all(points.columns[f"approach_{a}"] * normals[:, i] <= 0) for i, a in enumerate("xyz"))
 
 
 def test_a_measurement_that_shows_nothing_leaves_today_s_uncertainty(found: PartMeasurement) -> None:
