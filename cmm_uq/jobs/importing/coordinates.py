@@ -191,10 +191,10 @@ def _named(columns: Sequence[FigureColumn], levels: Mapping[str, float]) -> list
             ]
     parts = [rest for rest, own in found.items() if len(own) < 3]
     for a, b in permutations(parts, 2):
-        if "x" not in found[a] or len(both := {**found[a], **found[b]}) != len(found[a]) + len(found[b]):
+        if "x" not in found[a] or len(found[a]) + len(found[b]) != 3 or len(both := {**found[a], **found[b]}) != 3:
             continue
         each = [columns.index(c) for axis in "xyz" for c in both.get(axis, ())]
-        if len(both) == len(each) == 3 and each == [*range(each[0], each[0] + 3)]:
+        if each == [*range(each[0], each[0] + 3)]:
             found |= {a: both, b: {}}  # a head that ends at an empty column
     whole = [(rest, own) for rest, own in found.items() if len(own) == 3 and len({*map(len, own.values())}) == 1]
     forms = [_COUNTED.sub("0", " ".join(rest)) for rest, _ in whole]

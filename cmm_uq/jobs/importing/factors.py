@@ -158,7 +158,7 @@ def hint(text: str, *, lengths: bool) -> str | None:
         (len(one) if one == word else len(one) - 0.5, -k, name)
         for k, word in enumerate(words)
         for name, those in ((LINE, line), (POINT, point), (RUN, run))
-        for one in those
+        for one in (those if unspaced(word) else those & {word})
         if one == word or (len(one) > 1 and unspaced(one) and word.endswith(one))  # what is meant stands last
     ]
     exact = [fit for fit in fits if fit[0] == int(fit[0])]

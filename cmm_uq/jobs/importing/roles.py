@@ -237,7 +237,8 @@ def said(*path: str) -> Role | None:
     if (role := next(exact, None) or next(abbreviated, None)) is not None:
         return role
     asian = [word for word in words if unspaced(word)]
-    fits = [(len(one), role) for role in _IN_TURN for one in of[role] if any(one in word for word in asian)]
+    roles = _IN_TURN if asian else ()
+    fits = [(len(one), role) for role in roles for one in of[role] if any(one in word for word in asian)]
     return max(fits)[1] if fits and max(fits)[0] > 1 else None
 
 
