@@ -82,6 +82,12 @@ def drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
 
 
+def nothing_foreseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests that are not about what further measurements would do either."""
+    drawn_once(monkeypatch)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.part.foresee", lambda found, stage: found)
+
+
 def found_again_once(job: PartJob, asked: PartOptions, stage: Stage = silent) -> PartMeasurement:
     """What a report's inputs give when computed again, once for all reports that have the very same inside and asked the same.
 

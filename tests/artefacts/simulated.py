@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from cmm_uq.app.api.outcomes import Report
 from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.plan import plan_outcome
 from cmm_uq.app.commands.reading import read_job
@@ -64,6 +65,11 @@ def analysed(job: str) -> Result:
 @cache
 def outcome(job: str) -> Outcome:
     return outcome_of(analysed(job))
+
+
+@cache
+def reported(job: str) -> Report:
+    return Report(outcome(job))
 
 
 @kept

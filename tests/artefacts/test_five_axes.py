@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,24 +13,34 @@ from scipy.spatial.transform import Rotation
 
 import cmm_uq
 from benchmarks.artefacts.five_axes_coverage import NAMED, drawn, names_of, positions, recorded
+from cmm_uq.app.api.outcomes import Report
 from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.app.commands.plan import write_plan
 from cmm_uq.app.commands.planning import make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Points
 from tests.jobs.test_reading import edit
 
 CHAINS = ["XYZ|AC", "XYZ-CA"]
 
 
+@cache
+def reported(chain: str) -> tuple[dict[str, Any], Points, Report]:
+    """The errors of a machine of 4 × 4 matrices, its recording, and the report of that."""
+    random, names = np.random.default_rng(8), names_of(chain, NAMED)
+    machine = drawn(random, names)
+    with TemporaryDirectory() as folder:
+        job = recorded(chain, machine, names, random, Path(folder) / "job")
+        return machine, read_job(job).points, cmm_uq.report(job, seed=1)
+
+
 @pytest.mark.long(but="XYZ-CA")
 @pytest.mark.parametrize("chain", CHAINS)
 def test_location_tilt_positioning_and_play_of_both_axes_are_estimated(tmp_path: Path, chain: str) -> None:
-    """Of a machine of 4 × 4 matrices; twenty-two numbers within 3 u, and the location of each axis named with its U."""
-    random, names = np.random.default_rng(8), names_of(chain, NAMED)
-    machine = drawn(random, names)
-    report = cmm_uq.report(recorded(chain, machine, names, random, tmp_path / "job"), seed=1)
-    for name in names:
+    """Twenty-two numbers within 3 u, and the location of each axis named with its U."""
+    machine, _, report = reported(chain)
+    for name in machine:
         found = report.estimates[report.estimates.index.str.startswith(f"{name}.")]
         if len(machine[name]) == 2:
             true = np.array([np.hypot(*machine[name]), np.arctan2(*machine[name][::-1])])
@@ -42,12 +55,9 @@ def test_location_tilt_positioning_and_play_of_both_axes_are_estimated(tmp_path:
         assert page.count(f">{error}<") == 1
 
 
-def test_ranges_are_those_of_polar_coordinates_about_the_axis_that_turned(tmp_path: Path) -> None:
+def test_ranges_are_those_of_polar_coordinates_about_the_axis_that_turned() -> None:
     """C on A at 35°: seen in the frame of C; A alone: about A, from where C has turned the spheres; both: along X, Y, Z."""
-    random, chain = np.random.default_rng(3), "XYZ|AC"
-    names = names_of(chain, NAMED)
-    job = recorded(chain, drawn(random, names), names, random, tmp_path / "job")
-    points, report = read_job(job).points, cmm_uq.report(job, seed=1)
+    _, points, report = reported("XYZ|AC")
     pivot = {"a": np.array([0.0, 5.0, 60.0]), "c": np.array([2.0, -3.0, 0.0])}
     spheres = report.results["spheres"]
     assert [one["turning"] for one in spheres] == [["A"]] * 4 + [["C"]] * 4 + [["A", "C"]] * 2
@@ -76,10 +86,9 @@ def test_ranges_are_those_of_polar_coordinates_about_the_axis_that_turned(tmp_pa
 
 
 @pytest.mark.parametrize("chain", CHAINS)
-def test_by_angle_is_the_mean_and_the_scatter_of_what_was_seen_there(tmp_path: Path, chain: str) -> None:
-    random, names = np.random.default_rng(3), names_of(chain, ("location",))
-    job = recorded(chain, drawn(random, names), names, random, tmp_path / "job")
-    points, found = read_job(job).points, cmm_uq.report(job, seed=1).results["by_angle"]
+def test_by_angle_is_the_mean_and_the_scatter_of_what_was_seen_there(chain: str) -> None:
+    _, points, report = reported(chain)
+    found = report.results["by_angle"]
     assert sum(one["count"] for one in found) == len(points)
     one = next(each for each in found if each["count"] == 2 and each["point"] == 1)
     same = (points.point == 1) & (points.columns["a_deg"] == one["a_deg"]) & (points.columns["c_deg"] == one["c_deg"])

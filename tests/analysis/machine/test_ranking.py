@@ -9,12 +9,13 @@ import cmm_uq
 from cmm_uq.analysis.machine.performance import contributions
 from cmm_uq.app.api.outcomes import Report
 from cmm_uq.base.units import MICROMETRE
+from tests.artefacts.simulated import reported
 from tests.conftest import ROOT
 
 
 @pytest.fixture(scope="module")
 def found() -> Report:
-    return cmm_uq.report(ROOT / "examples" / "iota-1102-20C")
+    return reported("iota-1102-20C")
 
 
 def test_the_share_of_each_error_is_what_it_does_to_the_lengths_of_the_bars(found: Report) -> None:

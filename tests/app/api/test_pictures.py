@@ -10,6 +10,7 @@ import cmm_uq
 from cmm_uq.app.api.outcomes import Part, Report
 from cmm_uq.certificate.document import Plot, Table
 from cmm_uq.jobs.part.job import TABLES
+from tests.artefacts.simulated import reported
 from tests.conftest import ROOT
 from tests.part_machines import THERE, by_results, plate_of
 
@@ -18,12 +19,12 @@ IOTA = ROOT / "examples" / "iota-1102-20C"
 
 @pytest.fixture(scope="module")
 def found() -> Report:
-    return cmm_uq.report(IOTA)
+    return reported("iota-1102-20C")
 
 
 @pytest.fixture(scope="module")
 def gauge() -> Report:
-    return cmm_uq.report(ROOT / "examples" / "gauge-blocks-simulated")
+    return reported("gauge-blocks-simulated")
 
 
 @pytest.fixture(scope="module")

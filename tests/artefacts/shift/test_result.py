@@ -10,21 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-import cmm_uq
 from cmm_uq.artefacts.shift.axis import ShiftResult
 from cmm_uq.artefacts.shift.result import Curve, correction_table, listed_draws, peak_to_valley
 from cmm_uq.artefacts.shift.smooth import DRAWS
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.error_map import error_map_csv, parse_error_map
 from cmm_uq.maths.inference.ensembles import ENSEMBLES
-from tests.conftest import ROOT
+from tests.artefacts.simulated import reported
 
 AXIS, PLANE = "shift-simulated", "shift-plate-simulated"
 
 
 @pytest.fixture(scope="module", params=[AXIS, PLANE])
 def found(request: pytest.FixtureRequest) -> Any:
-    return cmm_uq.report(ROOT / "examples" / request.param)
+    return reported(request.param)
 
 
 def listed_in(results: Any, place: str) -> float:
@@ -89,7 +88,7 @@ def test_the_file_has_the_draws_that_results_json_speaks_of(found: Any) -> None:
 @pytest.mark.long
 def test_in_every_draw_the_curve_ends_where_the_scale_leads() -> None:
     """Between the ends of the first series the curve rises by the mean sensitivity error times the way."""
-    found = cmm_uq.report(ROOT / "examples" / AXIS)
+    found = reported(AXIS)
     result = found.outcome.found
     assert isinstance(result, ShiftResult)
     series = result.estimate.series

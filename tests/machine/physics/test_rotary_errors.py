@@ -63,7 +63,7 @@ def test_u_of_points_and_of_what_lies_between_them_is_that_of_draws(chain: str) 
     there = points(chain)
     errors = errors_of(there, 3.0)
     random, drawn = np.random.default_rng(5), []
-    for _ in range(1500):
+    for _ in range(500):
         values = errors.values + errors.factor @ random.standard_normal(errors.factor.shape[1])
         drawn.append(RotaryErrors(errors.effects, values, errors.factor).errors(there))
     moved = np.array(drawn)

@@ -34,10 +34,10 @@ from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
 from tests.jobs.part.parts import NOBODY, plate, tables
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
-from tests.part_reports import drawn_once
+from tests.part_reports import nothing_foreseen
 from tests.result_keys import PART_RESULTS
 
-once = pytest.fixture(autouse=True)(drawn_once)
+once = pytest.fixture(autouse=True)(nothing_foreseen)
 TRIALS = 4000
 
 
