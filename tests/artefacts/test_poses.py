@@ -288,7 +288,7 @@ def test_a_new_plan_of_poses_is_written_and_its_recording_is_numbered_by_station
 
 
 def test_results_tell_how_well_further_poses_are_predicted() -> None:
-    outcome = plan_outcome(planned('criterion = "D"\nnumber = 15\n'), power=False)
+    outcome = plan_outcome(planned('criterion = "D"\nnumber = 8\n'), power=False)
     start, better = (outcome.results[name]["held_out"] for name in ("start", "better"))
     assert start["poses"] == better["poses"] == 100
     assert better["u_rms_um"] < start["u_rms_um"] < start["u_largest_um"]

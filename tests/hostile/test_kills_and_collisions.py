@@ -16,6 +16,12 @@ from benchmarks.hostile.processes import CHEAP
 AT_ONCE = 3  # processes side by side: a command here spends its second on imports
 
 
+@pytest.fixture(scope="module")
+def strace() -> None:
+    if not available():
+        pytest.skip("strace is not here, or may not trace")
+
+
 def side_by_side(
     runs: Sequence[tuple[str, Callable[[Path], tuple[object, list[str]]]]], folder: Path
 ) -> list[tuple[str, list[str]]]:
@@ -26,7 +32,7 @@ def side_by_side(
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not available(), reason="strace is not here, or may not trace")
+@pytest.mark.usefixtures("strace")
 def test_a_kill_at_any_call_that_moves_a_file_leaves_a_set_after_the_next_run(tmp_path: Path) -> None:
     where = [call for call in calls("simulate", over=True) if call[0].startswith("rename")]
     assert len(where) >= 5  # each file, and the folder that they come from
@@ -36,7 +42,7 @@ def test_a_kill_at_any_call_that_moves_a_file_leaves_a_set_after_the_next_run(tm
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not available(), reason="strace is not here, or may not trace")
+@pytest.mark.usefixtures("strace")
 def test_a_kill_that_does_not_come_is_counted_as_none(tmp_path: Path) -> None:
     outcome, found = strike(Kill("simulate", over=True, signal="SIGKILL", call=("rename", 1000)), tmp_path / "place")
     assert (outcome.code, found) == (0, ["the signal never came"])

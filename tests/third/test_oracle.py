@@ -92,7 +92,7 @@ def test_what_is_hidden_is_among_the_places_that_are_searched() -> None:
 
 
 def test_who_knows_the_form_tests_its_size() -> None:
-    found = outside(14)
+    found = outside(20)
     said, (name,) = told(found, 0), found.errors
     column = found.seen.seen(found.errors[name])
     z = column @ (found.seen.rest @ found.one.y) / np.linalg.norm(column)

@@ -20,8 +20,8 @@ from tests.recordings import TRAVEL, bar_facts, bars
 
 
 def searched(effect: str, size: float, length: float | None = None) -> SearchResult:
-    """Thirty bars on a machine with one error, told of nothing; their length is certified or not."""
-    points = bars(np.random.default_rng(21), 30, 400.0, Machine("m", "XYZ", TRAVEL))
+    """Twenty bars on a machine with one error, told of nothing; their length is certified or not."""
+    points = bars(np.random.default_rng(21), 20, 400.0, Machine("m", "XYZ", TRAVEL))
     truth = RecordingModel(Ballbar(bar_facts(), points), effects((effect,)))
     read = points.at(truth.simulate(np.array([size]), np.array([400.0]), Noise(1e-3), np.random.default_rng(22)))
     facts = bar_facts(length, None if length is None else 0.1)
