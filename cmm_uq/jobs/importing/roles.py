@@ -237,8 +237,7 @@ def said(*path: str) -> Role | None:
     if (role := next(exact, None) or next(abbreviated, None)) is not None:
         return role
     asian = [word for word in words if unspaced(word)]
-    roles = _IN_TURN if asian else ()
-    fits = [(len(one), role) for role in roles for one in of[role] if any(one in word for word in asian)]
+    fits = [(len(one), role) for role in _IN_TURN if asian for one in of[role] if any(one in w for w in asian)]
     return max(fits)[1] if fits and max(fits)[0] > 1 else None
 
 
