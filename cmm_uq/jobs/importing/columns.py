@@ -334,7 +334,8 @@ def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequenc
     row, width = sheet.rows[i], len(header.headings)
     if any(cell != "" and (not sheet.spreadsheet or is_number(cell)) for cell in row[width:]):
         halves = " (a decimal comma in cells that commas separate?)" if len(row) >= 2 * width - 1 else ""
-        problem = NotReadError if sheet.spreadsheet else CmmUqError
+        above = max(len(one) for one in sheet.rows[max(header.row - 1, 0) : header.first])  # of a head in several rows
+        problem = NotReadError if sheet.spreadsheet or above >= len(row) else CmmUqError
         raise problem(f"has {len(row)} cells where the header has {width}{halves}", where=sheet.at(where, i),
                       fix="Export with semicolons or tabs between cells, or mend the row")  # fmt: skip
     if len(row) <= max(needed) and not sheet.spreadsheet:

@@ -17,19 +17,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import COLUMNS, ROWS
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import UNITS as PRINTED
+from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.encodings import begins_with, decoded, head_text, local, root_of
-from cmm_uq.jobs.importing.format import (
-    LENGTHS,
-    UNITS,
-    Cell,
-    Fact,
-    Format,
-    ImportKeys,
-    Row,
-    Sheet,
-    length_named,
-    sheets_of,
-)
+from cmm_uq.jobs.importing.format import LENGTHS, UNITS, Cell, Fact, Format, ImportKeys, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of, without_results
 
 if TYPE_CHECKING:
@@ -57,21 +47,29 @@ class Qif(Format):
         items = [element for element in root.iter() if local(element).endswith("FeatureItem")]
         named = {item.get("id", ""): child(item, "FeatureName") for item in items}
         rows: list[Row] = []
-        others = 0
+        beside: list[dict[str, str]] = []  # what the results of each row say of themselves, as which placement
+        others, own = 0, dict[str, str]()
         for element in root.iter():
-            if local(element) in PLACED:
+            if local(element) == "MeasurementResults":
+                own = {one.get("name", ""): one.get("value", "") for one in element.iterfind("{*}Attributes/*")}
+            elif local(element) in PLACED:
                 rows.append(_feature(element, named, where))
             elif local(element) == "MeasuredPointSet":
                 rows += _points(element, where)
             else:
                 others += local(element).endswith(_MEASUREMENT)
+            beside += [own] * (len(rows) - len(beside))
         if not rows:
             problem = f"holds no measured sphere, point or circle, and {others} other features"
             fix = "Export the results with the measured features and their locations"
             raise CmmUqError(problem, where=where, fix=fix)
         facts = facts_of(Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", ""))),
                          "features_not_used", say("Features that are no place"), others)  # fmt: skip
-        return without_results(sheets_of(rows, WITH_DIRECTION, unit=length_unit(root, where), decimal=".", facts=facts))
+        further = [*dict.fromkeys(name for one in beside for name in one)]
+        of_all = zip(rows, beside, strict=True)
+        rows = [(sort, [*cells, *(one.get(k, "") for k in further)], line) for (sort, cells, line), one in of_all]
+        heads = [*WITH_DIRECTION, *further]
+        return without_results(sheets_of(rows, heads, unit=length_unit(root, where), decimal=".", facts=facts))
 
 
 def length_unit(root: Element, where: str) -> str | None:
@@ -81,7 +79,7 @@ def length_unit(root: Element, where: str) -> str | None:
     if length is None:
         return None
     name, factor = child(length, "UnitName"), length.findtext(".//{*}Factor")
-    metres, unit = float(factor or "1"), length_named(name)
+    metres, unit = float(factor or "1"), formats.length_named(name)
     if unit is None:
         unit = next((one for one in map(UNITS.get, LENGTHS) if one and abs(one.metres / metres - 1) < 1e-9), None)
     if unit is None or abs(unit.metres / metres - 1) > 1e-6:

@@ -189,10 +189,12 @@ def parts_of(label: Label) -> list[Label]:
             before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
         if len(found) > 1 or (found and cut is not str and found[0].values != label.values):
             return found
-    last = [m for value in label.values if (m := re.fullmatch(r"(.*?[^\W\d_]*)[\W_]*(\d+)\D*", value))]
+    last = [m for value in label.values if (m := re.fullmatch(r"(.*?[^\W\d_]*)[\W_]*(\d+)(\D*)", value))]
     if len(last) < len(label.values):
         return []
-    return [Label(label.words, tuple(m[k] for m in last), "part") for k in (1, 2)]
+    after = len({m[3] for m in last}) > 1  # as ``Length 25 X axis``
+    names = tuple(f"{m[1]}{m[3]}" if after else m[1] for m in last)
+    return [Label(label.words, names, "part"), Label(label.words, tuple(m[2] for m in last), "part")]
 
 
 def run_apart(label: Label, *, lengths: bool) -> list[Label]:

@@ -11,7 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.cells.encodings import is_number, values_of
-from cmm_uq.jobs.importing.factors import RUN, Label, codes, counted, in_turn, numbered_runs
+from cmm_uq.jobs.importing.factors import RUN, Label, codes, counted, in_turn, numbered_runs, together
 from cmm_uq.jobs.importing.format import Cell, Fact, ImportKeys, NotReadError
 from cmm_uq.jobs.importing.grouping import points_told_apart
 
@@ -62,6 +62,14 @@ def completed(
     both = {MEASUREMENT, POINT} <= {*columns}
     if both and len({*zip(*(own.tolist() for own in columns.values()), strict=True)}) == count:
         return dict(columns), []
+    if {MEASUREMENT, REPEAT} <= {*columns} and POINT not in columns:  # then names count the points of each
+        each = codes([*zip(columns[MEASUREMENT].tolist(), columns[REPEAT].tolist(), strict=True)])
+        for label in labels:
+            if together(each, codes(label.values)).max() + 1 == count:
+                points, told = _named(label.values)
+                return {**columns, POINT: points}, [
+                    Fact("point_names", say("Names in {column}", column=Verbatim(POINT)), told)
+                ]
     every = [*(Label(name, tuple(f"{one:g}" for one in values)) for name, values in columns.items()), *labels]
     try:
         found, facts = numbered_points(every, xyz, keys, place)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
+from cmm_uq.jobs.importing.factors import LINE, RUN, Label, codes, counted, hint, run_apart
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.header import printed_words
 from cmm_uq.jobs.importing.lengths.places import says_figures
@@ -58,6 +60,11 @@ class PcDmis(TextReport):
         if len({place.feature for place in places}) < len(places):  # one feature, measured again
             places = [replace(place, feature=place.dimension) for place in places]
         rows, headings = [place.row for place in places], WITH_DIRECTION[:4]
+        if beside := _set_ups(lines, [place.line for place in places]):
+            rows = [
+                (sort, [*own, *cells], line) for (sort, cells, line), *own in zip(rows, *beside.values(), strict=True)
+            ]
+            headings = [*beside, *headings]
         if not places:
             rows, headings = _lengths(found), ["name", "nominal", "measured"]
         if not rows:
@@ -122,6 +129,29 @@ def dimensions(lines: Sequence[str], where: str) -> list[Dimension]:
         elif found and (row := _FIGURES.match(content)):
             found[-1].rows[row["axis"].upper()] = content, ends, f"{where} line {line}"
     return found
+
+
+def _set_ups(lines: Sequence[str], places: Sequence[int]) -> dict[str, list[str]]:
+    """Measurement and repeat of places on these lines, where texts above them number both, as ``POSITION 1 - REPEAT 2``."""
+    titles, last, read = list[str](), "", 0
+    for line in places:
+        numbered = [text for text in lines[read:line] if _numbers_line(text)]
+        last, read = (numbered or [last])[-1], line
+        titles.append(last)
+    if len({*titles}) < 2 or "" in titles:
+        return {}
+    label = Label("", tuple(titles), "title")
+    parts = {counted(one, lengths=True): one.values for one in run_apart(label, lengths=True)}
+    if not parts.keys() >= {LINE, RUN}:
+        return {}
+    return {name: [f"{n + 1}" for n in codes(parts[of])] for name, of in (("measurement", LINE), ("repeat", RUN))}
+
+
+def _numbers_line(text: str) -> bool:
+    """Whether a text numbers a set-up and says no dimension."""
+    words = re.findall(r"[^\W_]+", text)
+    numbered = any(b.isdigit() and hint(a, lengths=True) == LINE for a, b in pairwise(words))
+    return numbered and not (_DIMENSION.match(text) or _FIGURES.match(text))
 
 
 def _lengths(found: Sequence[Dimension]) -> list[Row]:

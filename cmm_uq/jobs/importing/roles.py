@@ -199,7 +199,7 @@ class SheetReading:
             sort = sort_of(name)
             if c.i not in used and name in _FURTHER and c.full and not (sort and c.unit and sort[0] != c.unit.sort):
                 self.further[name] = converted(c.values, c.unit, name) if c.unit and sort else c.values
-        self.beside = _beside(grid, rows, used)
+        self.beside = _beside(grid, rows, used | {c.i for c in columns if c.role == "deviation" and c.minute})
         names = ((c.i, c.heading) for c in columns if understood(c.heading).column not in self.further)
         self.unused = [name for i, name in names if i not in used and name and not hint(name, lengths=True)]
 

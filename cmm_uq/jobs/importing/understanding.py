@@ -21,7 +21,7 @@ from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading
 from cmm_uq.jobs.importing.cells import left_out
-from cmm_uq.jobs.importing.cells.figures import metric, unit_elsewhere
+from cmm_uq.jobs.importing.cells.figures import metric, unit_elsewhere, unit_of
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
 from cmm_uq.jobs.importing.factors import codes, counted, hint
@@ -299,6 +299,9 @@ class Understanding:
             system = formats.UNITS["inch" if small.name == "microinch" else "mm"]
             stated = [(system, say("as its deviations are in {unit}", unit=Verbatim(small.name)))]
         figures, points = np.array(self.reading.figures).T, self.reading.kind == "points"
+        if points and not stated and small is not None and not any(unit_of([one]) for one in self.reading.unused):
+            what = f"the file mentions {small.name} alone, which may be the unit of the places"
+            raise NotReadError(what, where=where, fix=f'Say unit = "{small.name}", or unit = "mm"')
         largest = float(np.nanmax(np.ptp(figures, axis=1) if points else figures))
         if points and not on_a_plate(figures.T[np.unique(places(figures.T), return_index=True)[1]]):
             largest = min(largest, _AIRCRAFT)

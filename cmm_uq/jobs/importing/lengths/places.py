@@ -97,10 +97,16 @@ def _short(word: str) -> bool:
 def role_among(text: str) -> str:
     """What a head says of the figures below it; of two letters its first word."""
     words = plain_words(text)
-    found = (
-        _role(word) for k, word in enumerate(words) if len(word) > 2 or not word.isascii() or (k == 0 and len(word) > 1)
-    )
-    return next(filter(None, found), "")
+    own = [word for k, word in enumerate(words) if len(word) > 2 or not word.isascii() or (k == 0 and len(word) > 1)]
+    return next(filter(None, map(_role, own)), "") or next(filter(None, map(_begun, own)), "")
+
+
+def _begun(word: str) -> str:
+    """What a word without blanks begins with, as ``始点座標``."""
+    for of, those in words_of("places").items():
+        if any(unspaced(one) and len(one) > 1 and word.startswith(one) for one in those):
+            return of
+    return ""
 
 
 def _role(word: str) -> str:
