@@ -50,7 +50,7 @@ def _measured(cell: Cell, hidden: truth.Truth, random: np.random.Generator) -> d
     rows = np.column_stack([lengths, 1e3 * (asread - lengths), 1e3 * (now - lengths), 1e3 * u])
     held = found.held_out
     out = None if held is None else [held.uncorrected, held.named, held.corrected, *held.predicted]
-    return {"distances": np.round(rows, 5).tolist(), "held_out": out, "disagree": len(found.disagree)}
+    return {"distances": np.round(rows, 5).tolist(), "held_out": out, "disagree": len(found.agreement.disagree)}
 
 
 def tables(folder: Path) -> str:

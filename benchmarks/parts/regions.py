@@ -10,6 +10,7 @@ Run: ``python -m benchmarks.parts.regions FOLDER [--machines N] [--only WORDS]``
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -71,11 +72,17 @@ def offset(cell: Cell, random: np.random.Generator) -> float:
 
 
 def calibrated(
-    cell: Cell, hidden: truth.Truth, random: np.random.Generator
+    cell: Cell,
+    hidden: truth.Truth,
+    random: np.random.Generator,
+    change: Callable[[Any], Any] = lambda artefact: artefact,
 ) -> tuple[RecordingModel, NoisyPosterior, int]:
-    """The machine calibrated with the cell's artefact and noise: the named model, its posterior, and a seed for more."""
+    """The machine calibrated with the cell's artefact and noise: the named model, its posterior, and a seed for more.
+
+    ``change``: of the artefact as recorded.
+    """
     one = machines.Cell(cell.artefact.partition(" and ")[0], cell.noise, 0.0)
-    artefact = machines.calibrated(one, hidden, NOISE_MM, offset(cell, random), random)
+    artefact = change(machines.calibrated(one, hidden, NOISE_MM, offset(cell, random), random))
     model = RecordingModel(artefact, machines.NAMED, NOISE_MM if cell.noise == "stated" else None)
     model, estimate, _ = with_noise(model)
     seed = int(random.integers(2**31))

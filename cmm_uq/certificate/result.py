@@ -256,9 +256,11 @@ class Result:
 
     @cached_property
     def denied(self) -> tuple[tuple[str, str], ...]:
-        """Keys of parameters of which all errors together say something else of the recorded set-ups than the named ones."""
-        found = self.regions
-        effects = {effect for effect, _ in found.disagree} if isinstance(found, FactorRegions) else set()
+        """Keys of parameters that all errors together deny: of the machine all, where they deny what was read of it."""
+        found, effects = self.regions, set[str]()
+        if isinstance(found, FactorRegions):
+            read = [one.name for one in self.model.effects if found.agreement.of_readings and of_machine(one)]
+            effects = {*read, *(effect for effect, _ in found.agreement.factors)}
         return tuple((effect, name) for effect, named in self.parameters.items() if effect in effects for name in named)
 
     @cached_property

@@ -8,12 +8,14 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.machine.agreement import Agreement, FigurePair
 from cmm_uq.analysis.machine.regions import FactorRegions
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.certificate.certificate import with_capability
+from cmm_uq.certificate.certificate import certified, with_capability
 from cmm_uq.certificate.document import Paragraph, Table
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Page, Result
 from cmm_uq.certificate.results.contents import _identifiability
+from cmm_uq.certificate.sections.conformity import machine_alone, performance
 from cmm_uq.certificate.sections.method import method
 from cmm_uq.certificate.sections.regions import over_range, regions_data, regions_section, regions_warnings
 from cmm_uq.certificate.sections.results import error_factors
@@ -47,8 +49,17 @@ class Averaged(Result):
     averaged = 2  # type: ignore[assignment]
 
 
+def agreement(*pairs: FigurePair) -> Agreement:
+    return Agreement({"factor": 6, "line": 19, "length": 19}, pairs)
+
+
 def scale(value: float, u: float) -> Quantity:
     return Quantity(value, u, (value - 2 * u, value + 2 * u), analysed(JOB).parameters[KEY[0]][KEY[1]].unit)
+
+
+FACTOR = FigurePair("factor", KEY, scale(10.2, 0.5), scale(16.0, 0.5), 1.7)
+LINE = FigurePair("line", 4, scale(12.0, 1.5), scale(-25.0, 2.0), 2.5)
+LENGTH = FigurePair("length", 7, scale(12.0, 1.0), scale(3.0, 1.0), 1.2, 404.2)
 
 
 def first(result: Result) -> tuple[str, ...]:
@@ -119,7 +130,7 @@ def test_a_factor_that_all_errors_deny_is_withdrawn_with_both_figures_shown() ->
     kept = told(stated=scale(10.2, 0.5), tolerance=20.0, whole={KEY: scale(10.0, 4.0)})
     result = told(
         stated=scale(10.2, 0.5), tolerance=20.0, whole={KEY: scale(10.0, 4.0)}, recorded={KEY: scale(16.0, 0.5)},
-        disagree=(KEY,),
+        agreement=agreement(FACTOR),
     )  # fmt: skip
     assert KEY in result.not_given
     (warning,) = regions_warnings(result)
@@ -140,8 +151,51 @@ def test_a_factor_that_all_errors_deny_is_withdrawn_with_both_figures_shown() ->
     assert not regions_warnings(kept)
 
 
+def test_what_was_read_otherwise_than_expected_withdraws_what_follows_from_a_model_and_no_more() -> None:
+    """A line and a length that all errors together deny: no factor over the set-ups, the range or within a tolerance, and no
+    figure without noise; what is decided on values as read stands."""
+    job = outcome(JOB).results["conformity"]
+    kept, result = (
+        told(stated=scale(10.2, 0.5), tolerance=20.0, whole={KEY: scale(10.0, 4.0)}, agreement=agreement(*pairs))
+        for pairs in ((), (LINE, LENGTH))
+    )
+    assert [str(text) for text in regions_warnings(result)] == [
+        "No figure by a model of the machine's errors is given: the slope of the line of measurement 4 is 12.0 ± 3.0 ppm as "
+        "read, and −25.0 ± 4.0 ppm by all errors together, which their joint uncertainty does not allow. Decisions on values "
+        "as read stand.",
+        "No figure by a model of the machine's errors is given: the error of a length of 404.2 mm in measurement 7 is 12.0 ± "
+        "2.0 ppm as read, and 3.0 ± 2.0 ppm by all errors together, which their joint uncertainty does not allow. Decisions "
+        "on values as read stand.",
+    ]
+    assert {effect for effect, _ in result.not_given} >= {one.name for one in result.model.effects}
+    assert not over_range(result)
+    assert (machine_alone(kept), machine_alone(result)) == (regions().performance, None)
+    (verdict,) = [one for one in result.verdicts if one.name == "scale_x.ppm"]
+    assert verdict.outcome == "undecided"
+    data = certified(result, Page(lambda found: [], lambda found: {})).results
+    assert "performance_of_machine" not in data
+    (one,), (before,) = data["conformity"], job
+    assert {key: one[key] for key in one} == {key: before[key] for key in one}
+    assert data["accuracy_uncertainty"] == outcome(JOB).results["accuracy_uncertainty"]
+    found = data["regions"]["agreement"]
+    assert [(each["figure"], each["ratio"], each["length_mm"]) for each in found["disagree"]] == [
+        ("line 4", 2.5, None), ("length 7", 1.2, 404.2),
+    ]  # fmt: skip
+    notes = [str(note) for note in performance(result).blocks[0].notes]  # type: ignore[union-attr]
+    assert any("is not stated: statements of it contradict each other." in note for note in notes)
+
+
+def test_a_certificate_says_how_much_was_held_against_what() -> None:
+    texts = [str(one.text) for one in regions_section(told(agreement=agreement(replace(LENGTH, ratio=0.224)))).blocks
+             if isinstance(one, Paragraph)]  # fmt: skip
+    assert (
+        "44 figures were held against what all errors together say of them: error factors by the named errors alone, slopes "
+        "of lines and errors of lengths as read. The largest difference is 22 % of what their joint uncertainty allows."
+    ) in texts
+
+
 def test_of_an_average_over_explanations_no_figure_of_the_named_errors_alone_is_said() -> None:
-    result = told(stated=scale(10.2, 0.5), recorded={KEY: scale(16.0, 0.5)}, disagree=(KEY,))
+    result = told(stated=scale(10.2, 0.5), recorded={KEY: scale(16.0, 0.5)}, agreement=agreement(FACTOR))
     (warning,) = regions_warnings(Averaged(**{one.name: getattr(result, one.name) for one in fields(result)}))
     assert (
         str(warning) == "Scale error of X is not given: with errors beside the named ones the recording contradicts it."

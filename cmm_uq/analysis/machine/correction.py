@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, held_out_groups, predicted
+from cmm_uq.analysis.machine.agreement import Agreement
 from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings
-from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing, filling
+from cmm_uq.analysis.machine.regions import DrawnErrors, columns_of, filling
 from cmm_uq.analysis.machine.state import StatementEvidence, of_machine
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
@@ -57,7 +58,7 @@ class FieldMap:
     omitted: tuple[str, ...]  # errors of the machine that neither map nor covariance hold, by name
     # root mean square error of a coordinate in the measuring range, as it is and corrected
     range_um: tuple[float, float]
-    disagree: tuple[Key, ...]  # named errors of which all errors together say something else of the recorded set-ups
+    agreement: Agreement  # as of the certificate: the same draws
     held_out: HeldOutCorrection | None  # ``None`` where too little is left to make a map without a part of it
     statements: tuple[StatementEvidence, ...]  # what the recording says of what is stated of axes
 
@@ -100,9 +101,10 @@ def field_map(
     before = np.mean((draws @ at.T) ** 2) + np.mean(unresolved**2)
     error_map = replace(_filled(blank, figures @ mean), covariance=covariance)
     rms = float(np.sqrt(before) / MICROMETRE), float(np.sqrt(after) / MICROMETRE)
-    denied = disagreeing(model, posterior, drawn.recorded(model, posterior))
+    found = drawn.of_recording(model, posterior)
+    agreement = drawn.agreement(found, posterior, doubt, drawn.performance(model))
     held_out = tried(drawn, seed, lambda one: isinstance(one, AxisFunction), *held_out_groups(drawn.model))
-    return FieldMap(error_map, _omitted(model, drawn, held), rms, denied, held_out, drawn.statements)
+    return FieldMap(error_map, _omitted(model, drawn, held), rms, agreement, held_out, drawn.statements)
 
 
 def _of_place(effect: Effect) -> bool:

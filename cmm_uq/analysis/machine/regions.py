@@ -23,10 +23,17 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-import scipy
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
-from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws
+from cmm_uq.analysis.machine.agreement import (
+    Agreement,
+    Key,
+    RecordedDraws,
+    held_together,
+    of_factors,
+    of_lengths,
+)
+from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws, stated_noise
 from cmm_uq.analysis.machine.performance import (
     MachinePerformance,
     PriorInfluence,
@@ -34,7 +41,7 @@ from cmm_uq.analysis.machine.performance import (
     performance_of,
     rows_of,
 )
-from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings, recorded, shown_in_parts
+from cmm_uq.analysis.machine.recordings import ALONE, FurtherRecordings, components_of, recorded, shown_by
 from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_machine, stated_as, unmodelled_errors
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
@@ -47,7 +54,7 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import HYSTERESIS, PeriodicScale
 from cmm_uq.machine.physics.superposition import About
 from cmm_uq.maths.inference.family_sizes import BRIEF, FieldSizes, sample_sizes
-from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
+from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
@@ -87,9 +94,7 @@ _HALVES = ((0.0, 0.5), (0.5, 1.0))
 EIGHTHS = tuple(product(_HALVES, repeat=3))  # parts of the measuring range, by shares of the travels
 # part of the largest singular value that counts as none; of a named error, that least squares would then take for another
 _RANK, _ANOTHER = 1e-9, 1e-6
-_DISAGREES = 0.001  # probability with which any factor of a model that fits would be found to disagree
 
-Key = tuple[str, str]
 Ends = Sequence[tuple[float, float]]  # of a region along each axis, shares of the travels
 
 
@@ -101,7 +106,7 @@ class FactorRegions:
     # 95 % interval within which an angle, a ratio or a rate is in all eighths of it
     eighths: Mapping[Key, tuple[float, float]]
     recorded: Mapping[Key, Quantity]  # over the recorded set-ups, all errors together
-    disagree: tuple[Key, ...]  # of which the named model says something else of the recorded set-ups
+    agreement: Agreement  # of these with what is stated by the named errors alone, and with what was read
     scales: Mapping[str, Floats]  # (N,) sizes of each family, of what physics allows
     influence: tuple[PriorInfluence, ...]  # of other priors on the factors over the measuring range, in their order
     observations: tuple[int, int]  # reckoned with, and of how many
@@ -152,9 +157,24 @@ class DrawnErrors:
         """Of some of the observations, with the same errors."""
         return RecordedField.of(model, self.others, beside=self.beside.recordings, in_doubt=self.beside.doubted(model))
 
-    def recorded(self, model: RecordingModel, posterior: NoisyPosterior) -> Floats:
-        """Draws (N, k) of the named effects as means over the recorded set-ups, as an estimate of them alone has them."""
-        return np.asarray(self.own + self.further @ as_recorded(model, self.field, posterior).T)
+    def of_recording(self, model: RecordingModel, posterior: NoisyPosterior) -> RecordedDraws:
+        """What they make of all observations, with the estimate of the named errors alone, of ``posterior``."""
+        which, sigma = np.arange(self.field.modelled), float(np.median(posterior.sigma))
+        return RecordedDraws(model, which, self.own, self.field.effects, self.further, self.sizes.noise, sigma)
+
+    def agreement(
+        self, found: RecordedDraws, posterior: NoisyPosterior, doubt: Doubt, performance: MachinePerformance | None
+    ) -> Agreement:
+        """Of factors with those of the named errors alone, of slopes and lengths with what was read.
+
+        ``doubt``: what is stated to be in doubt about the unknowns: about both alike, unless other recordings bear on one.
+        """
+        model, every = found.model, [found.slopes(doubt)]
+        every.append(of_factors(model, posterior, found.factors, doubt if self.beside.recordings else Doubt(())))
+        if performance is not None:
+            noise = stated_noise(model, components_of(model), self.sizes.noise)
+            every.append(of_lengths(performance, model, noise, doubt))
+        return held_together(every)
 
     def performance(self, model: RecordingModel) -> MachinePerformance | None:
         """Figures of the recorded lengths without noise; ``None`` of an artefact that has no lengths.
@@ -188,6 +208,12 @@ class DrawnErrors:
         along = artefact.lines_of(rows)[1]
         along = along * (np.sign(np.sum(along * steps, axis=1)) / np.linalg.norm(along, axis=1))[:, None]
         acting, k, own = model.about(about), own.shape[1], own - about[: own.shape[1]]
+        if (lengths := artefact.lengths()) is not None and not np.array_equal(artefact.lines_of(rows)[1], steps):
+            # between other places than the readings', as of balls that were scanned: by what the artefact makes of errors
+            every, sizes = replace(model, used=np.ones_like(model.used)), [one.nominal for one in artefact.sizes]
+            shown = lengths - sizes[0] - artefact.size_change() @ (about[k:] - sizes) - every.residuals(about)
+            columns = np.hstack([shown_by(every, one) for one in (*model.effects, *self.field.effects)])
+            return np.asarray(shown + own @ columns[:, :k].T + further @ columns[:, k:].T)
 
         def added(some: Ints) -> Floats:
             which, ends = np.unique(rows[some], return_inverse=True)
@@ -246,10 +272,11 @@ def factor_regions(
     def within(change: Floats) -> Floats:
         return np.asarray(ours + others @ change[same].T)
 
+    of_recording, performance = drawn.of_recording(model, posterior), drawn.performance(model)
     doubted = partial(drawn.doubted, model, named)
     over_all, parts = doubted(within(whole)), np.stack([doubted(within(one)) for one in eighths])
     low, high = np.quantile(parts.min(axis=0), 0.025, axis=0), np.quantile(parts.max(axis=0), 0.975, axis=0)
-    recorded = drawn.recorded(model, posterior)
+    recorded = of_recording.factors
     quantities = [Quantity.of_draws(each, of) for each, of in zip(over_all.T, units, strict=True)]
     of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
     scales = dict(zip(field.field.families, sizes.families.T, strict=True))
@@ -259,8 +286,8 @@ def factor_regions(
         dict(zip(keys, quantities, strict=True)),
         {key: (float(low[i]), float(high[i])) for i, key in enumerate(keys) if str(units[i]) in _ANYWHERE},
         {key: Quantity.of_draws(recorded[:, i], of) for i, key, of in zip(named, keys, units, strict=True)},
-        disagreeing(model, posterior, recorded), scales, influence,
-        (int(drawn.model.used.sum()), int(model.used.sum())), drawn.statements, drawn.performance(model),
+        drawn.agreement(of_recording, posterior, doubt, performance), scales, influence,
+        (int(drawn.model.used.sum()), int(model.used.sum())), drawn.statements, performance,
     )  # fmt: skip
 
 
@@ -318,18 +345,3 @@ def _moved(machine: Machine, named: Sequence[Effect], others: Sequence[Effect], 
     found = inverse[:k] @ np.hstack([rigid[:, :0], *moving])
     found[np.any(told * length[:k, None] > _ANOTHER * length, axis=1)] = np.nan
     return np.asarray(found)
-
-
-def as_recorded(model: RecordingModel, field: RecordedField, posterior: NoisyPosterior) -> Floats:
-    """(k, j) by which the estimates of the named errors change with a unit of each coefficient of others."""
-    estimate = model.estimate()
-    weights = gain(estimate.linear, float(np.median(posterior.sigma)))[: field.modelled]
-    return np.hstack([weights @ part for one in field.effects for part in shown_in_parts(model, one)])
-
-
-def disagreeing(model: RecordingModel, posterior: NoisyPosterior, recorded: Floats) -> tuple[Key, ...]:
-    """Coefficients of the named model that draws (N, k) of the same from all errors together deny, jointly."""
-    one, k = posterior.draws[:, : recorded.shape[1]], recorded.shape[1]
-    off = np.abs(one.mean(axis=0) - recorded.mean(axis=0))
-    limit = scipy.special.ndtri(1 - 0.5 * _DISAGREES / max(k, 1)) * np.hypot(one.std(axis=0), recorded.std(axis=0))
-    return tuple(model.unknowns[i].key for i in np.flatnonzero(off > limit))

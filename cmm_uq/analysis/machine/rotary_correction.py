@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.analysis.machine.agreement import Agreement
 from cmm_uq.analysis.machine.correction import HeldOutCorrection, tried
-from cmm_uq.analysis.machine.regions import DrawnErrors, Key, columns_of, disagreeing
+from cmm_uq.analysis.machine.regions import DrawnErrors, columns_of
 from cmm_uq.analysis.machine.state import Unmodelled
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Points
@@ -36,7 +37,7 @@ class RotaryCorrection:
     omitted: tuple[str, ...]  # errors of the axes that it does not hold, by name
     # root mean square error of a coordinate at the recorded places, at any angles in the recorded ranges; corrected
     range_um: tuple[float, float]
-    disagree: tuple[Key, ...]  # named errors of which all errors together say something else
+    agreement: Agreement  # of named errors and of what was read with all errors together
     held_out: HeldOutCorrection | None  # ``None`` where too little is left without a part of the positions
 
 
@@ -50,8 +51,8 @@ def rotary_correction(
     before, after = (
         float(np.sqrt(np.mean((each @ at.T) ** 2)) / MICROMETRE) for each in (draws, draws - errors.values)
     )
-    denied = disagreeing(model, posterior, drawn.recorded(model, posterior))
-    return RotaryCorrection(errors, tuple(_omitted(model)), (before, after), denied, _held_out(drawn, seed))
+    agreement = drawn.agreement(drawn.of_recording(model, posterior), posterior, doubt, None)
+    return RotaryCorrection(errors, tuple(_omitted(model)), (before, after), agreement, _held_out(drawn, seed))
 
 
 def errors_given(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,6 +15,7 @@ from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.plans import ALIGNED
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.machine.agreement import lines_of
 from cmm_uq.analysis.screening.columns import Finding, finding
 from cmm_uq.analysis.screening.screening import (
     counted_with,
@@ -42,7 +43,6 @@ from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior, gain
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 _LINES = 2000  # draws of the sizes of the noise, over which a line's uncertainty is taken
-_ON_LINE = 0.05  # extent of points across a line over that along it
 
 
 def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Finding]]:
@@ -198,14 +198,13 @@ def contradictions(
 
     averaged : (N, k) draws of the model's unknowns over all explanations that remain.
     """
-    linear, along = estimate.linear, growth(model.artefact)
-    if along is None:
+    if growth(model.artefact) is None:
         return ()
-    components, mean = noise_of(model, in_turn=True), averaged.mean(axis=0)
+    linear, components, mean = estimate.linear, noise_of(model, in_turn=True), averaged.mean(axis=0)
     sizes = posterior.sizes.at(evenly(len(posterior.draws), _LINES))
     lines: dict[int, list[tuple[float, float, Contradiction]]] = {}
     along_axis = (1 - 2 * ALIGNED**2) * PPM
-    for number, weights in _lines(model, along[model.used], linear.freedoms):
+    for number, weights in lines_of(model, len(model.used)):
         slope = weights @ linear.design
         spoken = [i for i in np.flatnonzero(np.abs(slope) >= along_axis).tolist() if linear.unknowns[i].unit == "ppm"]
         if not spoken:
@@ -226,18 +225,6 @@ def contradictions(
         if off > factor * own:
             found.append(line)
     return tuple(found)
-
-
-def _lines(model: RecordingModel, along: Floats, placings: Freedoms) -> Iterator[tuple[int, Floats]]:
-    """Each measurement of points on one line, and the weights (m,) of the used observations in its slope, mm/mm."""
-    measurement, points = model.artefact.measurement[model.used], model.artefact.points
-    for number in np.unique(measurement).tolist():
-        xyz = points.xyz[points.measurement == number]
-        extents = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
-        own = np.where(measurement == number, along, 0.0)
-        about = placings.without(own[:, None])[:, 0]
-        if extents[1] <= _ON_LINE * extents[0] and about @ about > 0:
-            yield number, about / (about @ about)
 
 
 def accuracy(

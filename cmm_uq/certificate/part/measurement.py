@@ -93,6 +93,9 @@ class CertificateStatus:
     circular: bool = False  # whether an artefact of the calibration was certified on this very machine
     passed: tuple[PassedTest, ...] = ()
     interim: bool = False  # whether it is an interim check, and no calibration
+    against: tuple[
+        Text, ...
+    ] = ()  # what contradicts it: of its own figures, or of the machine as it is known with others
 
 
 @dataclass(frozen=True)
@@ -315,6 +318,7 @@ def standing_data(one: CertificateStatus) -> dict[str, Any]:
         "changes": None if one.changes is None else rows(parameter=one.changes, change=one.changes.values()),
         "temperature_c": one.temperature_c, "inputs_sha256": dict(one.inputs_sha256),
         **further_data(one.further), **passed_data(one.passed),
+        **({"against": list(map(_plain, one.against))} if one.against else {}),
     }  # fmt: skip
 
 

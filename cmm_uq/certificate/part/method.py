@@ -181,6 +181,7 @@ def decided_without(found: PartMeasurement) -> tuple[Text, ...]:
                                "calibration.")),
         (standing.circular, say("Nothing is called conforming, for the artefact that calibrated the machine was itself "
                                 "certified on that machine.")),
+        (standing.against, say("Nothing is called conforming, for statements of the machine contradict each other.")),
     ))  # fmt: skip
 
 

@@ -231,9 +231,9 @@ def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: b
 
 
 def machine_alone(result: Result) -> MachinePerformance | None:
-    """``None`` where nothing is stated of the machine without noise."""
+    """``None`` where nothing is stated of the machine without noise, or other statements of it contradict it."""
     regions = result.regions
-    return regions.performance if isinstance(regions, FactorRegions) else None
+    return regions.performance if isinstance(regions, FactorRegions) and not regions.agreement.disagree else None
 
 
 def own_figures(result: Result) -> Mapping[str, Quantity]:
@@ -285,8 +285,9 @@ def performance(result: Result) -> Section:
     if own:
         notes.append(say("Machine alone: 95 % interval of the figure by all errors of the machine, without noise and errors "
                          "of artefact or reading; it decides nothing."))  # fmt: skip
-    elif not isinstance(regions, FactorRegions) and regions:
-        notes.append(say("What of them is the machine's alone, without noise, is not stated: {why}.", why=regions))
+    elif regions and (not isinstance(regions, FactorRegions) or regions.agreement.disagree):
+        why = say("statements of it contradict each other") if isinstance(regions, FactorRegions) else regions
+        notes.append(say("What of them is the machine's alone, without noise, is not stated: {why}.", why=why))
     notes += wording.skewed_note(result.accuracy.values())
     return section(title, Table(title, columns(heads), tuple(rows), tuple(notes)))
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from cmm_uq.analysis.machine.agreement import Key
 from cmm_uq.analysis.machine.performance import ALL, MATTERS, PriorInfluence
-from cmm_uq.analysis.machine.regions import FactorRegions, Key, readings_of
+from cmm_uq.analysis.machine.regions import FactorRegions, readings_of
 from cmm_uq.analysis.machine.state import FREE, StatementEvidence
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, after, holding, listed, number, say, semicolons, signed
 from cmm_uq.base.points import AXES, Floats, Machine
@@ -21,6 +22,7 @@ from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, section, table
 from cmm_uq.certificate.origin import further_data, further_table, quantity_data
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.sections.agreement import agreement_data, contradicted, held
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.machine.model.field import FAMILIES, PERIODIC, PLAY, READ, STATED, allowed, family_of
 from cmm_uq.machine.model.readings import AxisReading
@@ -69,7 +71,11 @@ def regions_section(result: Result) -> Section:
     )  # fmt: skip
     read_by = readings_table(result.model.artefact.points.machine, regions.statements)
     tables = sizes_table(regions.scales), read_by, changes_table(regions.influence, names), further_table(further.each)
-    told = Paragraph(after(words, further.together)), _table(result, regions, ranged)
+    told = (
+        Paragraph(after(words, further.together)),
+        _table(result, regions, ranged),
+        Paragraph(held(regions.agreement)),
+    )
     return section(_TITLE, *told, Paragraph(prior) if regions.influence else None, *tables)
 
 
@@ -102,7 +108,9 @@ def regions_warnings(result: Result) -> list[Text]:
     if not isinstance(regions, FactorRegions):
         return texts
     texts += [*readings_warnings(regions.statements, regions.scales), *result.further().warnings]
-    for key in result.denied:
+    texts += contradicted(regions.agreement)
+    denied = {effect for effect, _ in regions.agreement.factors}
+    for key in (one for one in result.denied if one[0] in denied):
         one, together = result.parameters[key[0]][key[1]], regions.recorded.get(key)
         name, alone = wording.title_of(key, result), wording.with_uncertainty(one)
         texts.append(
@@ -157,7 +165,7 @@ def regions_data(result: Result) -> dict[str, Any]:
             "observations": some, "of": count,
             "recorded": _by_effect({key: quantity_data(recorded[key]) for key in both}),
             "eighths": _by_effect({key: list(regions.eighths[key]) for key in ranged if key in regions.eighths}),
-            "disagree": [".".join(key) for key in regions.disagree],
+            "disagree": [".".join(key) for key in regions.agreement.factors], "agreement": agreement_data(regions.agreement),
             "families": families_data(regions.scales), **({"axes": read_by} if read_by else {}),
             **further_data(result.further().each), "of_priors": [".".join(key) for key in regions.whole],
             "priors": priors_data(regions.influence),

@@ -259,10 +259,11 @@ class Doubt:
 
     # of each cause the changes of the estimates, all observations erring together (k, r) and apart (k, q)
     carried: tuple[tuple[Floats, Floats], ...]
+    causes: tuple[Cause, ...] = ()  # of the observations that these estimates are from
 
     @classmethod
     def of(cls, causes: Sequence[Cause], weights: Floats) -> Doubt:
-        return cls(tuple(cause.carried(weights) for cause in causes))
+        return cls(tuple(cause.carried(weights) for cause in causes), tuple(causes))
 
     def variance(self, combination: Floats) -> float:
         """Of a combination (k,) of the estimates, in their units: of each cause the larger one."""

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.machine import regions as room
+from cmm_uq.analysis.machine.agreement import RecordedDraws, held_together, of_factors
 from cmm_uq.analysis.machine.conditional import RecordedField, doubted_draws
 from cmm_uq.analysis.machine.regions import FactorRegions, factor_regions
 from cmm_uq.analysis.machine.state import Unmodelled
@@ -104,7 +105,9 @@ def test_over_the_recorded_set_ups_a_factor_is_what_the_recording_without_noise_
         [u.prior_mean for u in found.model.unknowns[field.modelled :]]
     )
     fitted = solve(replace(about.linear, observed=exact + sizes)).value[: field.modelled]
-    told = theta + room.as_recorded(found.model, field, found.posterior) @ c
+    noise, sigma = found.posterior.sizes, float(np.median(found.posterior.sigma))
+    which = np.arange(field.modelled)
+    told = RecordedDraws(found.model, which, theta[None], field.effects, c[None], noise, sigma).factors[0]
     # the estimator has a prior of 300 ppm, where u is 20: it is smaller by (20/300)², 0.4 %
     np.testing.assert_allclose(told, fitted, atol=6e-3 * float(np.abs(fitted).max()))
 
@@ -113,7 +116,7 @@ def test_a_mean_over_the_set_ups_is_known_better_than_a_factor_elsewhere() -> No
     """Of twenty bars: the named model and all errors together agree on what was recorded; U grows with the region that is
     asked for, as no set-up fills it."""
     found, named = regions("iota-1102-20C"), analysed("iota-1102-20C").parameters
-    assert not found.disagree
+    assert not found.agreement.disagree
     for key, quantity in found.whole.items():
         stated, recorded = named[key[0]][key[1]], found.recorded[key]
         assert abs(stated.value - recorded.value) < 0.2 * stated.u
@@ -160,7 +163,19 @@ def test_a_model_is_denied_beyond_its_joint_uncertainty(times: float, denied: bo
     draws = found.posterior.draws[:, :6].copy()
     draws[:, 2] += times * np.sqrt(2) * draws[:, 2].std()
     key = found.model.unknowns[2].key
-    assert room.disagreeing(found.model, found.posterior, draws) == ((key,) if denied else ())
+    agreement = held_together([of_factors(found.model, found.posterior, draws, Doubt(()))])
+    assert agreement.factors == ((key,) if denied else ())
+
+
+def test_of_several_recordings_what_is_in_doubt_about_one_is_no_contradiction() -> None:
+    """By several recordings 4.5 standard deviations away, which the first one's doubt, three times u, allows."""
+    found = analysed("iota-1102-20C")
+    draws = found.posterior.draws[:, :6].copy()
+    sd = draws.std(axis=0)
+    draws[:, 2] += 4.5 * np.sqrt(2) * sd[2]
+    doubt = Doubt(((np.append(3 * sd, np.zeros(len(found.model.unknowns) - 6))[:, None], np.zeros((7, 0))),))
+    assert held_together([of_factors(found.model, found.posterior, draws, Doubt(()))]).factors
+    assert not held_together([of_factors(found.model, found.posterior, draws, doubt)]).factors
 
 
 def test_without_a_travel_nothing_is_told_of_other_places() -> None:

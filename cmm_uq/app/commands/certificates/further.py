@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
+from cmm_uq.analysis.machine.agreement import RecordedDraws
 from cmm_uq.analysis.machine.conditional import further_recording, given_recording, own_noise
 from cmm_uq.analysis.machine.recordings import ALONE, CONTRADICTED, FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.regions import other_errors
@@ -34,8 +35,9 @@ from cmm_uq.jobs.tables.machine import FurtherFacts
 from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.stated import with_own_physics
+from cmm_uq.maths.inference.draws import evenly
 from cmm_uq.maths.inference.family_sizes import BRIEF
-from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
+from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.verification import Computing, Verification
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
 # quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
 # show of errors left out. Those of all further recordings together.
 MOST, MOST_FURTHER = 200, 150
+_HELD = 400  # draws by which it is looked at whether they agree with a recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,6 +277,9 @@ class GivenRecordings:
     without: MachineState | None = None
     # of its calibration, and those that are taken together with it, where all of its errors follow from these
     recordings: tuple[RecordingModel, FurtherRecordings] | None = None
+    # some of the draws of its errors, and what is in doubt about its recording, by which these are held against each other
+    drawn: RecordedDraws | None = None
+    causes: tuple[Cause, ...] = ()
 
 
 def given_recordings(
@@ -315,4 +321,19 @@ def given_recordings(
     passing = taken is not others.taken
     beside = FurtherRecordings(others.taken.recordings, partial(causes_of, circumstances=job.circumstances))
     alone = without if passing else None
-    return GivenRecordings(together, text, True, further, tests, alone, None if passing else (model, beside))
+    causes = tuple(one.at(model.used) for one in causes_of(model.artefact, job.circumstances))
+    own, drawn = None if passing else (model, beside), _drawn(together, model, sigma)
+    return GivenRecordings(together, text, True, further, tests, alone, own, drawn, causes)
+
+
+def _drawn(state: MachineState, model: RecordingModel, sigma_mm: float) -> RecordedDraws | None:
+    """Some of the draws of a machine's errors given a recording, those of its named errors before others."""
+    if state.given is None:
+        return None
+    named, some = state.given.before.effects, evenly(len(state.draws), _HELD)
+    keys = {(one.name, each.name) for one in named for each in one.coefficients}
+    which, draws = np.flatnonzero([one.key in keys for one in model.unknowns]), state.draws[some]
+    own, further = draws[:, : len(which)], draws[:, len(which) :]
+    return RecordedDraws(
+        model, which, own, state.effects[len(named) :], further, state.given.sizes.noise.at(some), sigma_mm
+    )

@@ -139,8 +139,8 @@ def write_new_map(
                 found = field_map(result.model, result.posterior, result.doubt, observe, seed, together.taken)
         except CmmUqError as error:
             raise CmmUqError(error.problem, where=error.where or str(read.folder), fix=error.fix) from error
-        if found.disagree:
-            names_of = ", ".join(".".join(key) for key in found.disagree)
+        if found.agreement.disagree:
+            names_of = ", ".join(dict.fromkeys(one.name for one in found.agreement.disagree))
             problem = f"all errors together say something else of {names_of} than the named ones alone"
             fix = f"cmm-uq diagnose {read.folder} says what may be wrong"
             raise CmmUqError(f"{problem}: neither makes a map", where=str(read.folder), fix=fix)

@@ -195,8 +195,8 @@ def errors_found(read: Job, seed: int, stage: Stage) -> RotaryCorrection:
     result, observe = estimated(read, "made a file of errors of", seed, stage)
     with physics_of(read):
         found = rotary_correction(result.model, result.posterior, result.doubt, observe, seed)
-    if found.disagree:
-        names = ", ".join(".".join(key) for key in found.disagree)
+    if found.agreement.disagree:
+        names = ", ".join(dict.fromkeys(one.name for one in found.agreement.disagree))
         problem = f"all errors together say something else of {names} than the named ones alone"
         fix = f"cmm-uq diagnose {read.folder} says what may be wrong"
         raise CmmUqError(f"{problem}: neither corrects the machine", where=str(read.folder), fix=fix)

@@ -34,6 +34,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.certificate.clauses import draft
 from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
+from cmm_uq.certificate.sections.agreement import against_certificate
 from cmm_uq.certificate.sections.regions import readings_warnings
 from cmm_uq.certificate.verify.given import CHECKS, Given, given_of
 from cmm_uq.jobs.job import CIRCULAR, Job
@@ -176,17 +177,13 @@ def state_machine(
     passed, change = job.facts.machine_state.passed, known.change if known else None
     found = given_recordings(state, stated.job, more, passed, change, seed)
     state, further = found.state, found.further
+    circular = standing.circular or any(one.job.facts.certified_on_this_machine for one in more)
+    against = against_certificate(stated.results, found.drawn, found.causes)
+    standing = replace(standing, circular=circular, drift=since.told, changes=since.changes, further=further.each)
     standing = replace(
-        standing,
-        circular=standing.circular or any(one.job.facts.certified_on_this_machine for one in more),
-        path=found.path,
-        drift=since.told,
-        given_recording=found.given,
-        changes=since.changes,
-        further=further.each,
-        passed=found.passed,
+        standing, path=found.path, given_recording=found.given, passed=found.passed, against=tuple(against)
     )
-    told = [*further.warnings, *machine_warnings(job, standing, stated.job)]
+    told = [*against, *further.warnings, *machine_warnings(job, standing, stated.job)]
     told += readings_warnings(state.statements, state.scales)
     if passed and not found.given:
         told.append(
