@@ -23,14 +23,20 @@ from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import machines, truth
 from benchmarks.parts.curved import SORTS, Cell as OfSort, Smooth, drawn, study
 from benchmarks.parts.regions import calibrated
-from cmm_uq.analysis.machine.agreement import Agreement
+from cmm_uq.analysis.machine.agreement import Agreement, RecordedDraws, held_together, of_factors, of_lengths
+from cmm_uq.analysis.machine.conditional import RecordedField, stated_noise, white
+from cmm_uq.analysis.machine.performance import MachinePerformance, rows_of
+from cmm_uq.analysis.machine.recordings import shown_by
 from cmm_uq.analysis.machine.regions import DrawnErrors, other_errors
 from cmm_uq.machine.model.field import ROTATION, family_of
-from cmm_uq.machine.model.measurement import RecordingModel
-from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
+from cmm_uq.machine.model.measurement import Estimate, RecordingModel
+from cmm_uq.maths.inference.family_sizes import Effort, sample_sizes
+from cmm_uq.maths.inference.linear_model import solve
+from cmm_uq.maths.inference.posterior import Density, Doubt, NoisyPosterior
 
 BEGIN, END = "<!-- written by benchmarks.parts.agreement -->", "<!-- end of agreement -->"
 NO_DOUBT, EXPANSION = Doubt(()), 11.5e-6
+NOISE_MM, EFFORT = 0.7e-3, Effort(200, 8000, 60.0, 50, sampler=False, slopes=True)
 DRAWS = 500  # of all errors together, where a report has 2000: sizes of families are as many
 ALONG_UM, ACROSS_UM, TURN_ARCSEC = 20.0, 50.0, 30.0
 """Root mean square over the travel that the page allows; those of other errors are :data:`benchmarks.parts.truth.PHYSICS`."""
@@ -65,11 +71,15 @@ class Cell:
     @property
     def key(self) -> tuple[int, ...]:
         """Seeds of its own."""
-        own = machines.Cell(self.artefact, self.noise, 0.0).key
-        return 99 if self.sort is None else self.sort, *own, list(WRONG).index(self.wrong)
+        own = machines.Cell(self.artefact, "stated" if self.noise == KNOWN else self.noise, 0.0).key
+        sort = (98 if self.noise == KNOWN else 99) if self.sort is None else self.sort
+        return sort, *own, list(WRONG).index(self.wrong)
 
 
+KNOWN = "known"
+"""Noise of the machines that are made by the thousand: everything is linear then, and all but sizes is exact."""
 EVERY = (
+    *(Cell(None, artefact, KNOWN) for artefact in ("bars", "step gauge")),
     *(Cell(None, artefact, noise) for artefact in ("bars", "step gauge") for noise in ("white", "stated", "set-up")),
     *(Cell(sort, artefact, "white") for artefact in ("bars", "step gauge") for sort in range(8)),
     *(Cell(0, artefact, "white", wrong) for wrong in list(WRONG)[1:] for artefact in ("bars", "step gauge")),
@@ -125,6 +135,8 @@ def as_stated(random: np.random.Generator) -> truth.Truth:
 def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     """One machine: of each kind of figure the largest difference, over what is allowed; by what is wrong."""
     cell, seed, number = task
+    if cell.noise == KNOWN:
+        return counted(cell, seed, number, lambda random: {"size": 0.0, **_linear(cell, random)}, 13)
     size = WRONG[cell.wrong][number % len(WRONG[cell.wrong])]
     return counted(cell, seed, number, lambda random: {"size": size, **_measured(cell, size, random)}, 13)
 
@@ -136,8 +148,60 @@ def _measured(cell: Cell, size: float, random: np.random.Generator) -> dict[str,
         of, hidden, random, lambda artefact: wronged(artefact, cell.wrong, size, random)
     )
     agreement = _held(model, posterior, cell.wrong, seed)
+    return _told(agreement)
+
+
+def _told(agreement: Agreement) -> dict[str, Any]:
     worst = {kind: max((one.ratio for one in agreement.pairs if one.kind == kind), default=0.0) for kind in KINDS}
     return {"ratios": worst, "figures": sum(agreement.counts.values()), "disagree": len(agreement.disagree)}
+
+
+def _linear(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
+    """A machine of the priors in the linear model of a recording itself, whose noise is known: all but the sizes is exact.
+
+    The artefact stands as on a machine without errors; what is observed is drawn from the model, sizes and errors too.
+    """
+    one, none = machines.Cell(cell.artefact, "stated", 0.0), truth.Truth.of_six(dict.fromkeys(truth.SIX, 0.0))
+    blank = RecordingModel(machines.calibrated(one, none, 0.0, 0.0, random), machines.NAMED, NOISE_MM)
+    estimate, others = blank.estimate(), other_errors(blank)
+    whole, linear = RecordedField.of(blank, others), estimate.linear
+    family = np.abs(random.standard_normal((1, len(whole.field.families))))
+    theta = linear.prior_mean + linear.prior_sd * random.standard_normal(len(linear.unknowns))
+    observed = linear.design @ theta + NOISE_MM * linear.noise_scale * random.standard_normal(len(linear.observed))
+    for errors in whole.field.errors:
+        size = 1.0 if errors.family is None else family[0, whole.field.families.index(errors.family)]
+        observed = observed + size * errors.columns @ errors.draw(random, 1)[0, : errors.columns.shape[1]]
+    linear = replace(linear, observed=observed)
+    found = solve(linear)
+    model = copy(blank)
+    model.__dict__["_estimate"] = Estimate(found, linear, estimate.about)
+    known = white(NOISE_MM)
+    field = replace(whole, field=replace(whole.field, linear=linear, estimate=found))
+    sizes = sample_sizes(field.field, DRAWS, int(random.integers(2**31)), known, EFFORT)
+    drawn = field.coefficients(sizes.noise, sizes.families, random)
+    k = field.modelled
+    alone = field.coefficients(known.at(np.zeros(DRAWS, dtype=np.int64)), np.full_like(sizes.families, 1e-4), random)
+    mean, covariance, _ = Density(linear).conditional(float(np.log(NOISE_MM)))
+    named = random.multivariate_normal(mean, covariance, DRAWS)
+    of_recording = RecordedDraws(model, np.arange(k), drawn[:, :k], field.effects, drawn[:, k:], sizes.noise, NOISE_MM)
+    posterior = NoisyPosterior(
+        linear.unknowns, named, np.full(DRAWS, NOISE_MM), 0, sampler="", ess_min=np.inf, rhat_max=1.0, steps=1,
+        autocorrelation_time=0.0, sizes=sizes.noise,
+    )  # fmt: skip
+    every = [of_recording.slopes(NO_DOUBT), of_factors(model, posterior, of_recording.factors, NO_DOUBT)]
+    half = np.where(np.arange(DRAWS)[:, None] % 2, alone, drawn)
+    rows, seen = rows_of(model.artefact), np.hstack([shown_by(model, one) for one in field.effects])
+    read = observed - linear.design[:, k:] @ linear.prior_mean[k:]
+    expected = half[:, :k] @ linear.design[:, :k].T + half[:, k:] @ seen.T
+    assert rows is not None
+    if model.artefact.rows.shape[1] == 1:
+        at = np.empty(len(model.artefact.points), dtype=np.int64)
+        at[model.artefact.rows[:, 0]] = np.arange(len(read))
+        (first, last) = at[rows].T
+        read, expected = read[last] - read[first], expected[:, last] - expected[:, first]
+    performance = MachinePerformance(model.artefact.points, rows, 1e3 * expected, 1e3 * read, of_bar=True)
+    noise = stated_noise(model, field.field.noise, sizes.noise)
+    return _told(held_together([*every, of_lengths(performance, model, noise, NO_DOUBT)]))
 
 
 def wronged(artefact: Any, wrong: str, size: float, random: np.random.Generator) -> Any:

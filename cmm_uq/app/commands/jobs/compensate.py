@@ -141,7 +141,7 @@ def write_new_map(
             raise CmmUqError(error.problem, where=error.where or str(read.folder), fix=error.fix) from error
         if found.agreement.disagree:
             names_of = ", ".join(dict.fromkeys(one.name for one in found.agreement.disagree))
-            problem = f"all errors together say something else of {names_of} than the named ones alone"
+            problem = f"all errors together say something else of {names_of} than is stated of it"
             fix = f"cmm-uq diagnose {read.folder} says what may be wrong"
             raise CmmUqError(f"{problem}: neither makes a map", where=str(read.folder), fix=fix)
         return place.write(_map_files(read, found, together.told)), found

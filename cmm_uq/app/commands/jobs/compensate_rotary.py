@@ -197,7 +197,7 @@ def errors_found(read: Job, seed: int, stage: Stage) -> RotaryCorrection:
         found = rotary_correction(result.model, result.posterior, result.doubt, observe, seed)
     if found.agreement.disagree:
         names = ", ".join(dict.fromkeys(one.name for one in found.agreement.disagree))
-        problem = f"all errors together say something else of {names} than the named ones alone"
+        problem = f"all errors together say something else of {names} than is stated of it"
         fix = f"cmm-uq diagnose {read.folder} says what may be wrong"
         raise CmmUqError(f"{problem}: neither corrects the machine", where=str(read.folder), fix=fix)
     return found

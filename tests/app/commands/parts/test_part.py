@@ -411,6 +411,7 @@ def test_tips_whose_places_to_each_other_nobody_states_pass_nothing(offsets: lis
 @pytest.mark.parametrize(("standing", "lack"), [
     ({}, ""), ({"origin": "measured"}, ""), ({"origin": "measured", "circular": True}, "certified on that machine."),
     ({"origin": "measured", "interim": True}, "and no calibration."),
+    ({"origin": "measured", "against": (say("…"),)}, "statements of the machine contradict each other."),
     ({"origin": "simulated"}, "its calibration is no measurement."),
     ({"origin": "compensated"}, "its calibration is no measurement."),
 ])  # fmt: skip
