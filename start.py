@@ -90,17 +90,17 @@ def compile_sources(folder: Path) -> None:
 
 
 def test(arguments: list[str]) -> int:
-    """Lint, types beside the tests; all run even when one fails. Tests run on all cores, each with one thread.
+    """Types beside lint and tests; all run even when one fails. Tests run on all cores, each with one thread.
 
     Without arguments the tests that take long are left out; with ``--all`` none is; others go to pytest, which then runs all.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each command that tests start compiles the package again
     usual = TESTS if arguments else (*TESTS, "--quick")
-    results = [run("ruff", "check"), run("ruff", "format", "--check")]
     with subprocess.Popen(  # told when the tests are done, or its lines would stand among theirs
         [str(SCRIPTS / "mypy")], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as types:
+        results = [run("ruff", "check"), run("ruff", "format", "--check")]
         results += [run("pytest", *(arguments if arguments not in ([], ["--all"]) else usual))]
         print(types.communicate()[0], end="")
     return max(*results, types.returncode)

@@ -62,6 +62,7 @@ class Study:
         self.items = {item.nodeid: item for item in session.items}
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  # one folder for all forks
         cover = Cover(self.options.keep, list(self.items))
+        gc.unfreeze()  # what is collected is frozen, and not listed
         self.present = functions()
         gc.freeze()
         running: dict[int, tuple[Mutant, list[str], float, int]] = {}
