@@ -8,6 +8,7 @@ What a part may be that was measured: less errors of place, not less form that o
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -103,13 +104,23 @@ def interval(at: float, coverage: float = 0.95) -> tuple[float, float]:
     return max(0.0, at + float(ndtri(below))), at - float(ndtri(above))
 
 
-def accepted(mean: float, x: Floats, coverage: float) -> Floats:
+MEANS = np.linspace(0.0, 9.0, 901)
+
+
+def accepted(mean: float, coverage: float) -> tuple[float, float]:
     """Measurements x on a grid, in the order of their ratios of likelihoods, until they have the coverage (Neyman's belt)."""
+    x = np.linspace(-8.0, 14.0, 11_001)
     ratio = -0.5 * (x - mean) ** 2 + 0.5 * (x - np.maximum(x, 0)) ** 2
     weights = np.exp(-0.5 * (x - mean) ** 2)
     order = np.argsort(-ratio)
     inside = np.cumsum(weights[order]) <= coverage * weights.sum()
-    return np.asarray(x[order[inside]])
+    belt = x[order[inside]]
+    return float(belt.min()), float(belt.max())
+
+
+@cache
+def belts(coverage: float) -> Floats:
+    return np.array([accepted(mean, coverage) for mean in MEANS])
 
 
 @pytest.mark.long(but="0.95")
@@ -117,10 +128,9 @@ def accepted(mean: float, x: Floats, coverage: float) -> Floats:
 @pytest.mark.parametrize("at", [0.3, 1.2, 1.9, 2.4, 3.1, 4.0, 6.0])
 def test_limits_are_those_of_the_belt(at: float, coverage: float) -> None:
     """Means whose accepted measurements reach this one: by brute force, means on a grid of a hundredth."""
-    x, means = np.linspace(-8.0, 14.0, 11_001), np.linspace(0.0, 9.0, 901)
-    belts = [accepted(mean, x, coverage) for mean in means]
-    holding = [mean for mean, belt in zip(means, belts, strict=True) if belt.min() <= at <= belt.max()]
-    assert interval(at, coverage) == pytest.approx((min(holding), max(holding)), abs=0.015)
+    low, high = belts(coverage).T
+    holding = MEANS[(low <= at) & (at <= high)]
+    assert interval(at, coverage) == pytest.approx((holding.min(), holding.max()), abs=0.015)
 
 
 def test_an_interval_of_a_measurement_below_zero_ends_where_a_twentieth_of_what_is_possible_lies_beyond() -> None:
