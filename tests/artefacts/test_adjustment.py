@@ -7,7 +7,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
@@ -56,6 +56,7 @@ def turned(guides: dict[str, np.ndarray], squareness, chain: str) -> dict[str, n
 
 
 @pytest.mark.parametrize("chain", CHAINS)
+@settings(max_examples=20)
 @given(st.tuples(DEGREES, DEGREES, DEGREES))
 def test_the_turns_make_the_axes_of_every_chain_square(chain: str, degrees) -> None:
     squareness = np.radians(degrees)

@@ -98,12 +98,16 @@ def erring(name: str, axis: RotaryAxis, angle: float, sense: float, values: Floa
     return matrix(zero, um * motion) @ turn(axis, angle)
 
 
+SOME = np.arange(0, len(ON_TABLE), 3)
+
+
 def by_rigid_motions(there: Points, name: str, values: Floats) -> Floats:
-    """Where points are on a table with these faults, less where a faultless machine takes them to be; of a head its tip."""
+    """Where some points are on a table with these faults, less where a faultless one takes them to be; of a head its tip."""
     machine, found = there.machine, []
     assert isinstance(machine, RotaryMachine)
     head = name.startswith("head")
-    for i, xyz in enumerate(ON_TABLE):
+    for i in SOME:
+        xyz = ON_TABLE[i]
         right, wrong = np.eye(4), np.eye(4)
         for axis in machine.head if head else machine.tables:
             point, angle = matrix(np.zeros(3), machine.pivot(axis)), np.radians(there.columns[axis.column][i])
@@ -136,7 +140,7 @@ def test_each_effect_is_the_derivative_of_exact_motions_of_the_whole_chain(chain
             values = random.normal(size=len(EVERY[name].coefficients))
             values /= np.abs(values).sum()
             exact = 0.5 * (by_rigid_motions(there, name, values) - by_rigid_motions(there, name, -values))
-            np.testing.assert_allclose(shown(there, name, values), exact, atol=1e-9, err_msg=name)
+            np.testing.assert_allclose(shown(there, name, values)[SOME], exact, atol=1e-9, err_msg=name)
             assert np.abs(exact).max() > 1e-5
             seen += 1
     assert seen == 18 * len(chain.replace("-", ""))
@@ -187,7 +191,7 @@ def test_higher_orders_are_a_sum_of_waves_whose_size_is_their_rms(name: str, par
 
     one = by_rigid_motions(points("c"), effect.name, coefficients)
     other = by_rigid_motions(points("c"), effect.name, -coefficients)
-    np.testing.assert_allclose(shown(points("c"), effect.name, coefficients), 0.5 * (one - other), atol=1e-8)
+    np.testing.assert_allclose(shown(points("c"), effect.name, coefficients)[SOME], 0.5 * (one - other), atol=1e-8)
     ((size, value),) = effect.to_reported(coefficients, np.zeros(0)).items()
     parts = 2 if name == "radial" else 1
     assert value == pytest.approx(np.sqrt(0.5 * (4 + 1 + 0.25 + 2.25) / parts), rel=1e-9)
