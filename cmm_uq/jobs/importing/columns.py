@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import takewhile
 
 import numpy as np
 
@@ -186,7 +187,8 @@ class ExportTable:
                 text = []
                 usable.append(i)
         cut = sheet.unended and len(usable) > 1 and all(len(sheet.rows[i]) == width for i in usable[:-1])
-        for i in [*(usable[-1:] if cut else []), *([] if sheet.spreadsheet else figured(text))]:
+        at_once = takewhile(lambda i: figured([i]), text)  # below words stands another table
+        for i in [*(usable[-1:] if cut else []), *([] if sheet.spreadsheet else at_once)]:
             if len(sheet.rows[i]) < width:
                 raise CmmUqError(f"the row ends after {len(sheet.rows[i])} of {width} cells: the file was cut off",
                                  where=sheet.at(self.where, i), fix="Export it again")  # fmt: skip
@@ -334,7 +336,7 @@ def _refuse_another_length(sheet: Sheet, header: Header, i: int, needed: Sequenc
     row, width = sheet.rows[i], len(header.headings)
     if any(cell != "" and (not sheet.spreadsheet or is_number(cell)) for cell in row[width:]):
         halves = " (a decimal comma in cells that commas separate?)" if len(row) >= 2 * width - 1 else ""
-        above = max(len(one) for one in sheet.rows[max(header.row - 1, 0) : header.first])  # of a head in several rows
+        above = max(len(one) for one in sheet.rows[max(header.row - 2, 0) : header.first])  # of a head in several rows
         problem = NotReadError if sheet.spreadsheet or above >= len(row) else CmmUqError
         raise problem(f"has {len(row)} cells where the header has {width}{halves}", where=sheet.at(where, i),
                       fix="Export with semicolons or tabs between cells, or mend the row")  # fmt: skip

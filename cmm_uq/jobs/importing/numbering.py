@@ -11,7 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.cells.encodings import is_number, values_of
-from cmm_uq.jobs.importing.factors import RUN, Label, codes, counted, in_turn, numbered_runs, together
+from cmm_uq.jobs.importing.factors import RUN, Label, codes, counted, in_turn, numbered_runs, parts_of, together
 from cmm_uq.jobs.importing.format import Cell, Fact, ImportKeys, NotReadError
 from cmm_uq.jobs.importing.grouping import points_told_apart
 
@@ -64,8 +64,10 @@ def completed(
         return dict(columns), []
     if {MEASUREMENT, REPEAT} <= {*columns} and POINT not in columns:  # then names count the points of each
         each = codes([*zip(columns[MEASUREMENT].tolist(), columns[REPEAT].tolist(), strict=True)])
-        for label in labels:
-            if together(each, codes(label.values)).max() + 1 == count:
+        most = np.bincount(each).max()
+        for label in (*labels, *(part for one in labels for part in parts_of(one))):
+            own = codes(label.values)
+            if own.max() < most and together(each, own).max() + 1 == count:
                 points, told = _named(label.values)
                 return {**columns, POINT: points}, [
                     Fact("point_names", say("Names in {column}", column=Verbatim(POINT)), told)
