@@ -32,7 +32,7 @@ beside measured ones, columns of nominal places as names of set-ups, angles of a
 ``form_exports``, with nine of twenty-four more in nineteen languages that were tried once then: 15 were read or asked about as
 their authors allow, 1 was asked about needlessly, 4 were refused and 4 read wrongly (placements in the plate's own coordinates
 as repeats, three times; micrometres as millimetres). Then twenty more in fifteen languages: 16 were read or asked about as
-their authors allow, 3 refused, and one read wrongly (a ball whose name had its placement in it as another ball); four are there.
+their authors allow, 3 refused and one read wrongly (a ball whose name had its placement in it as another); four are there.
 """
 
 from __future__ import annotations
