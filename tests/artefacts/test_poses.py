@@ -64,7 +64,7 @@ def plan_of(job: Job) -> MeasurementPlan:
 
 @cache
 def in_the_cell() -> MeasurementPlan:
-    return plan_of(planned(f'criterion = "D"\nnumber = 25\n{CELL}'))
+    return plan_of(planned(f'criterion = "D"\nnumber = 16\n{CELL}'))
 
 
 def frames(q: Floats, rows: Floats, tool: Floats) -> list[Floats]:
@@ -101,7 +101,7 @@ def readings(plan: MeasurementPlan) -> Floats:
 
 def test_no_link_enters_a_box_or_the_floor_and_the_reflector_is_seen() -> None:
     poses = readings(in_the_cell())
-    assert len(poses) == 25
+    assert len(poses) == 16
     low, high = np.array([[-90, -40, -50, -120, -90, -150], [90, 60, 50, 120, 90, 150]]) * np.pi / 180
     assert np.all((poses >= low - 1e-9) & (poses <= high + 1e-9))
     for q in poses:

@@ -76,7 +76,7 @@ def test_every_column_that_is_used_is_coloured_where_it_stands(name: str, tmp_pa
 UNSEEN = Path(__file__).parents[2] / "jobs" / "importing"
 
 
-@pytest.mark.long(but="T")  # a folder of exports stands for all, which are read in tests/jobs/importing
+@pytest.mark.long(but="T0")  # some exports stand for all, which are read in tests/jobs/importing
 @pytest.mark.parametrize(
     "path",
     [path for path in sorted(UNSEEN.glob("*_exports/*")) if not path.name.endswith((".json", ".source.txt", "SUMS"))],
