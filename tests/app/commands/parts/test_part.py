@@ -464,7 +464,8 @@ def test_nothing_conforms_by_an_uncertainty_that_lacks_what_the_job_does_not_sta
 ) -> None:
     """A plate measured without an error, which passed with a warning."""
     plain = tables()
-    changes = {name: plain[name] | table for name, table in (("environment", environment), ("form", form))}
+    asked = {"form": plain["form"] | form, "characteristic": plain["characteristic"][:2]}
+    changes = {"environment": plain["environment"] | environment, **asked}
     found = evaluate_part(plate_of(by_results(), np.zeros((60, 3)), **changes, **THERE), PartOptions(trials=1000))
     told = [f"Nothing is called conforming, for the job states no uncertainty of these: {lacks}."] if lacks else []
     assert [str(text) for text in found.withheld] == told == [str(one) for one in found.warnings if str(one) in told]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
-from cmm_uq.jobs.part.job import part_of, read_part
+from cmm_uq.jobs.part.job import TABLES, part_of, read_part
 from cmm_uq.jobs.verdicts import gravest
 from tests.jobs.part.test_qif import document
 from tests.part_machines import by_certificate, plate_files, plate_of
@@ -27,8 +28,9 @@ TRIALS = 4000
 VALUES = "characteristic,value_mm\n1,30.000000\n2,0.040000\n3,0.000000\n5,40.000000\n"
 
 
-def job_files(values: str = VALUES) -> dict[str, bytes]:
-    return {**plate_files(by_certificate(), recording={"values": "report.csv"}), "report.csv": values.encode()}
+def job_files(values: str = VALUES, **changes: Any) -> dict[str, bytes]:
+    files = plate_files(by_certificate(), recording={"values": "report.csv"}, **changes)
+    return {**files, "report.csv": values.encode()}
 
 
 @cache
@@ -82,7 +84,7 @@ def test_the_report_says_whose_values_these_are_and_what_was_not_in_them() -> No
 
 def test_the_last_printed_digit_is_part_of_the_uncertainty() -> None:
     """Printed to a tenth of a millimetre, u² is larger by 0.1²/12 than with six digits."""
-    files = job_files("characteristic,value_mm\n1,30.0\n")
+    files = job_files("characteristic,value_mm\n1,30.0\n", characteristic=TABLES["characteristic"][:1])
     (one,) = evaluate_part(part_of(files), PartOptions(trials=TRIALS)).stated
     assert one.u == pytest.approx(np.hypot(by_values().stated[0].u, 0.1 / np.sqrt(12)), rel=4 / np.sqrt(TRIALS))
 
