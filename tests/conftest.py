@@ -17,6 +17,7 @@ import pytest
 from hypothesis import settings
 
 from cmm_uq.app.cli import NEW_OBJECTS
+from cmm_uq.base.messages import NOTHING
 from cmm_uq.base.points import Machine, Points
 from tests.recordings import TRAVEL, bars
 
@@ -167,6 +168,12 @@ def iota() -> Path:
 def job(iota: Path, tmp_path: Path) -> Path:
     """A copy of that job to spoil."""
     return Path(shutil.copytree(iota, tmp_path / "job"))
+
+
+@pytest.fixture
+def no_regions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests that analyse a job of their own, and are not about where in the machine its errors hold."""
+    monkeypatch.setattr("cmm_uq.app.commands.report.factor_regions", lambda *_: NOTHING)
 
 
 @pytest.fixture
