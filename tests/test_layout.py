@@ -27,7 +27,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 3_375, "maths": 11_050, "jobs": 18_102, "machine": 7_788, "analysis": 21_377, "laboratory": 14_442,
-    "certificate": 16_632, "artefacts": 13_919, "app": 18_485,
+    "certificate": 16_632, "artefacts": 13_918, "app": 18_485,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1458

@@ -107,7 +107,7 @@ def _measured(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
 
     def virtual_of(known: MachineState) -> tuple[Virtual, MeasurementConditions]:
         how = MeasurementConditions(known, (pose,), Surroundings(machines.PART), measured=points)
-        return Virtual(PLAN, how, dict(machines._nominal()), machines.PILOT), how
+        return Virtual(PLAN, how, dict(machines.nominal()), machines.PILOT), how
 
     def expanded(virtual: Virtual) -> Floats:
         errors = virtual.errors(np.random.default_rng(seed), machines.TRIALS)

@@ -119,7 +119,7 @@ CELLS = (
 
 
 @cache
-def _nominal() -> Known:
+def nominal() -> Known:
     """The part's features at their nominal points, which are those of every machine."""
     known: Known = {}
     Evaluator(plan(), np.zeros_like(plan().points), (), known)
@@ -184,7 +184,6 @@ def on_machine(
     *,
     tested: bool | None = None,
     warm_k: float = 0.0,
-    pose: PartPose | None = None,
 ) -> dict[str, Any]:
     """A machine with a hidden truth, calibrated, corrected, measuring the part.
 
@@ -192,7 +191,7 @@ def on_machine(
     certificates, in order; how probable each is by those before is kept, and one that is not is left out. ``tested``: whether
     a test of lengths that the corrected machine passed is stated besides; ``None`` for no test, which is made else anyhow.
     ``warm_k``: standard uncertainty, as stated, of the temperatures of the artefact in the calibration and of each scale on
-    the day of the part, when these are at 22 °C. ``pose``: of the part; near its larger bore a ring then stands.
+    the day of the part, when these are at 22 °C.
     """
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
@@ -210,12 +209,8 @@ def on_machine(
     known = None if given is None else white(given)
     for artefact in beside:
         first = FurtherRecording(model, own_noise(model, certificate.unmodelled, seed, known))
-        near = None if pose is None else pose.of(RING_AT) + [20, 20, 10] * random.uniform(-1, 1, 3)
-        further = calibrated(replace(cell, artefact=artefact), hidden, sigma, offset, random, near=near)
-        ring = artefact == "ring"
-        other = RecordingModel(further, (*NAMED, *PROBED) if ring else NAMED)
-        doubts = causes_of(further, Circumstances()) if ring else ()
-        found = further_recording(first, other, certificate.unmodelled, seed, given, doubts)
+        other = RecordingModel(calibrated(replace(cell, artefact=artefact), hidden, sigma, offset, random), NAMED)
+        found = further_recording(first, other, certificate.unmodelled, seed, given)
         chances.append(found.contradiction(state))
         if chances[-1] >= CONTRADICTED:
             taken.append(found)
@@ -241,7 +236,7 @@ def on_machine(
         kelvin = SCALE.excess + warm_k * random.standard_normal(3)
         expanded = (SCALE.cte_per_k + cte) * kelvin - SCALE.cte_per_k * SCALE.excess
         today = replace(hidden, scale=hidden.scale + 1e6 * expanded)
-    pose = pose or placed(random)
+    pose = placed(random)
     part = truth.made_part(random, made.place_um, made.form_um)
     measuring = truth.Measuring(today, corrected, pose.rotation, pose.translation_mm, float(np.hypot(sigma, offset)),
                                 1e-3 * U_TIP_UM * float(random.standard_normal()), float(growth))  # fmt: skip
@@ -249,7 +244,7 @@ def on_machine(
     points = measuring.measured(joined(part), normals, random)
     true = truth.characteristics(part)
     how = MeasurementConditions(state, (pose,), Surroundings(PART, scales), measured=points)
-    virtual = Virtual(plan(), how, dict(_nominal()), PILOT)
+    virtual = Virtual(plan(), how, dict(nominal()), PILOT)
     errors = virtual.errors(random, TRIALS)
     simulated = simulate(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)
     rows = {one.name: [true[one.name], one.value, one.u, *one.interval]

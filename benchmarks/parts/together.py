@@ -29,7 +29,6 @@ class Cell:
 
     sort: curved.Sort
     artefacts: tuple[str, ...]
-    sorts: tuple[curved.Sort, ...] = tuple(SORTS)
 
     @property
     def name(self) -> str:
@@ -38,7 +37,7 @@ class Cell:
     @property
     def key(self) -> tuple[int, ...]:
         """Seeds of its machine, the same with a further certificate."""
-        return self.sorts.index(self.sort), *machines.Cell(self.artefacts[0], "white", 0.0).key
+        return SORTS.index(self.sort), *machines.Cell(self.artefacts[0], "white", 0.0).key
 
 
 CELLS = tuple(Cell(sort, artefacts) for sort in SORTS for artefacts in (("bars",), ("bars", "step gauge")))
@@ -56,13 +55,13 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     return counted(cell, seed, number, measure)
 
 
-def tables(folder: Path, cells: tuple[Cell, ...] = CELLS) -> str:
+def tables(folder: Path) -> str:
     """As of :func:`benchmarks.parts.curved.tables`, and of how many machines a further certificate was contradicted."""
 
     def against(cell: Cell, done: list[dict[str, Any]]) -> list[str]:
         return [str(sum(min(r["chances"]) < CONTRADICTED for r in done)) if cell.artefacts[1:] else "–"]
 
-    return curved.table_of(folder, cells, ("class, certificates", "machines", "contradicted"), against)
+    return curved.table_of(folder, CELLS, ("class, certificates", "machines", "contradicted"), against)
 
 
 if __name__ == "__main__":

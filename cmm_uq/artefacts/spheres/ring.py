@@ -302,13 +302,12 @@ def results(result: Result) -> dict[str, Any]:
 
 def sections(result: Result) -> list[Section]:
     ring = cast("RingGauge", result.artefact)
-    angle = np.degrees(about_axis(ring.directions(ring.points.xyz), ring.measurement)) % 360
     caption = say(
         "Distance from the axis minus {name}, as recorded and after the fitted model, with U (k = {k}).",
         name=radius_words(ring),
         k=number(result.noise.coverage_factor, ".2f"),
     )
-    plot = radial_plot(result, ring, caption, say("Angle about the axis / °"), np.round(angle, 1))
+    plot = radial_plot(result, ring, caption, say("Point around the ring"), ring.points.point)
     return [Section(say("Probing of the ring"), (_table(result, ring), _lobes(result, ring), plot))]
 
 

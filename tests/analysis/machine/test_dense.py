@@ -12,6 +12,7 @@ import scipy.linalg
 from cmm_uq.analysis.machine import recordings
 from cmm_uq.analysis.machine.conditional import RecordedField, shown, white
 from cmm_uq.analysis.machine.state import Unmodelled
+from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.field import covariance, curves, family_of, linear
@@ -22,6 +23,8 @@ from cmm_uq.maths.inference import families as room
 from cmm_uq.maths.inference.families import FieldModel
 from cmm_uq.maths.inference.posterior import Density
 from tests.analysis.machine.test_conditional import calibration, gauge
+from tests.artefacts.constructions import indicated, model as named, rings
+from tests.recordings import with_columns
 
 OTHERS = (*curves(), *effects(["hysteresis_x", "hysteresis_y", "hysteresis_z"]))
 PERIODIC = effects(["periodic_scale_x", "periodic_scale_y", "periodic_scale_z"])
@@ -56,6 +59,14 @@ def dense(
     return about.prior_mean + found @ X.T @ weight @ left, found
 
 
+def ring() -> RecordingModel:
+    """Rings of 50 mm at two heights, flat, standing and askew, approached along their normals."""
+    points, facts = rings((-6.0, 6.0)), artefact_facts(kind="ring", length_mm=50.0, u_um=0.2)
+    points = with_columns(points, **{f"approach_{a}": -np.sign(np.round(points.columns[f"n{a}"], 9)) for a in "xyz"})
+    names = ["probe_radius", "squareness_xy", "scale_x"]
+    return named(facts, indicated(facts, points, names, [3.0, 20.0, 8.0], sigma=SIGMA, seed=3), names)
+
+
 def off(found: tuple[Floats, Floats], expected: tuple[Floats, Floats]) -> tuple[float, float]:
     """By how much means, and covariances, differ at most, in standard uncertainties."""
     k, u = len(expected[0]), np.sqrt(np.diag(expected[1]))
@@ -63,11 +74,11 @@ def off(found: tuple[Floats, Floats], expected: tuple[Floats, Floats]) -> tuple[
     return float(np.abs(mean / u).max()), float(np.abs(spread / np.outer(u, u)).max())
 
 
-@pytest.mark.parametrize("recorded", [calibration, gauge])
+@pytest.mark.parametrize("recorded", [calibration, gauge, ring])
 def test_the_posterior_is_that_of_dense_matrices_to_eight_digits(
     recorded: Callable[[], RecordingModel], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Twenty bars, and a step gauge of seven lines thrice, with all observations."""
+    """Twenty bars, a step gauge of seven lines thrice, and three rings, with all observations."""
     monkeypatch.setattr(room, "_UNSEEN", (0.0, 0.0))
     model = recorded()
     whole = field(model)
@@ -93,7 +104,7 @@ def test_contrasts_of_repeats_say_next_to_nothing_of_the_machine() -> None:
     assert max(off(whole.normal(white(SIGMA), scales), dense(model, whole.families, scales))) < 2e-3
 
 
-@pytest.mark.parametrize("recorded", [calibration, gauge])
+@pytest.mark.parametrize("recorded", [calibration, gauge, ring])
 def test_with_no_other_errors_it_is_what_a_certificate_states(
     recorded: Callable[[], RecordingModel], monkeypatch: pytest.MonkeyPatch
 ) -> None:
