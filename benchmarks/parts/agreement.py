@@ -14,29 +14,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from benchmarks.coverage.measuring import counted, kept
 from benchmarks.parts import machines, truth
 from benchmarks.parts.curved import SORTS, Cell as OfSort, Smooth, drawn, study
 from benchmarks.parts.regions import calibrated
-from cmm_uq.analysis.machine.agreement import Agreement, RecordedDraws, held_together, of_factors, of_lengths
-from cmm_uq.analysis.machine.conditional import RecordedField, stated_noise, white
-from cmm_uq.analysis.machine.performance import MachinePerformance, rows_of
-from cmm_uq.analysis.machine.recordings import shown_by
+from cmm_uq.analysis.machine.agreement import DISAGREES, Agreement, lines_of
+from cmm_uq.analysis.machine.conditional import RecordedField
+from cmm_uq.analysis.machine.performance import rows_of
 from cmm_uq.analysis.machine.regions import DrawnErrors, other_errors
 from cmm_uq.machine.model.field import ROTATION, family_of
-from cmm_uq.machine.model.measurement import Estimate, RecordingModel
-from cmm_uq.maths.inference.family_sizes import Effort, sample_sizes
-from cmm_uq.maths.inference.linear_model import solve
-from cmm_uq.maths.inference.posterior import Density, Doubt, NoisyPosterior
+from cmm_uq.machine.model.measurement import RecordingModel
+from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior, gain
 
 BEGIN, END = "<!-- written by benchmarks.parts.agreement -->", "<!-- end of agreement -->"
 NO_DOUBT, EXPANSION = Doubt(()), 11.5e-6
-NOISE_MM, EFFORT = 0.7e-3, Effort(200, 8000, 60.0, 50, sampler=False, slopes=True)
+NOISE_MM, SIZES = 0.7e-3, 2000  # sizes of families, of which each machine of known noise has one
+ALIKE = 100  # machines of known noise that are measured in the same places
 DRAWS = 500  # of all errors together, where a report has 2000: sizes of families are as many
 ALONG_UM, ACROSS_UM, TURN_ARCSEC = 20.0, 50.0, 30.0
 """Root mean square over the travel that the page allows; those of other errors are :data:`benchmarks.parts.truth.PHYSICS`."""
@@ -136,7 +136,8 @@ def measured(task: tuple[Cell, int, int]) -> dict[str, Any]:
     """One machine: of each kind of figure the largest difference, over what is allowed; by what is wrong."""
     cell, seed, number = task
     if cell.noise == KNOWN:
-        return counted(cell, seed, number, lambda random: {"size": 0.0, **_linear(cell, random)}, 13)
+        own = partial(_linear, cell.artefact, seed, number // ALIKE)
+        return counted(cell, seed, number, lambda random: {"size": 0.0, **own()[number % ALIKE]}, 13)
     size = WRONG[cell.wrong][number % len(WRONG[cell.wrong])]
     return counted(cell, seed, number, lambda random: {"size": size, **_measured(cell, size, random)}, 13)
 
@@ -156,52 +157,79 @@ def _told(agreement: Agreement) -> dict[str, Any]:
     return {"ratios": worst, "figures": sum(agreement.counts.values()), "disagree": len(agreement.disagree)}
 
 
-def _linear(cell: Cell, random: np.random.Generator) -> dict[str, Any]:
-    """A machine of the priors in the linear model of a recording itself, whose noise is known: all but the sizes is exact.
+@dataclass(frozen=True, eq=False)
+class Dense:
+    """A recording's places, and what of its observations follows from machines of the priors, by whole matrices.
 
-    The artefact stands as on a machine without errors; what is observed is drawn from the model, sizes and errors too.
+    Parameters
+    ----------
+    figures : (q, n) combinations of what placings leave of the observations, and their kinds.
+    own : (n, n) covariance of noise and artefact.
+    root, inverse : of the covariance of all, for sizes that are drawn from their priors (S, n, n).
     """
-    one, none = machines.Cell(cell.artefact, "stated", 0.0), truth.Truth.of_six(dict.fromkeys(truth.SIX, 0.0))
-    blank = RecordingModel(machines.calibrated(one, none, 0.0, 0.0, random), machines.NAMED, NOISE_MM)
-    estimate, others = blank.estimate(), other_errors(blank)
-    whole, linear = RecordedField.of(blank, others), estimate.linear
-    family = np.abs(random.standard_normal((1, len(whole.field.families))))
-    theta = linear.prior_mean + linear.prior_sd * random.standard_normal(len(linear.unknowns))
-    observed = linear.design @ theta + NOISE_MM * linear.noise_scale * random.standard_normal(len(linear.observed))
-    for errors in whole.field.errors:
-        size = 1.0 if errors.family is None else family[0, whole.field.families.index(errors.family)]
-        observed = observed + size * errors.columns @ errors.draw(random, 1)[0, : errors.columns.shape[1]]
-    linear = replace(linear, observed=observed)
-    found = solve(linear)
-    model = copy(blank)
-    model.__dict__["_estimate"] = Estimate(found, linear, estimate.about)
-    known = white(NOISE_MM)
-    field = replace(whole, field=replace(whole.field, linear=linear, estimate=found))
-    sizes = sample_sizes(field.field, DRAWS, int(random.integers(2**31)), known, EFFORT)
-    drawn = field.coefficients(sizes.noise, sizes.families, random)
-    k = field.modelled
-    alone = field.coefficients(known.at(np.zeros(DRAWS, dtype=np.int64)), np.full_like(sizes.families, 1e-4), random)
-    mean, covariance, _ = Density(linear).conditional(float(np.log(NOISE_MM)))
-    named = random.multivariate_normal(mean, covariance, DRAWS)
-    of_recording = RecordedDraws(model, np.arange(k), drawn[:, :k], field.effects, drawn[:, k:], sizes.noise, NOISE_MM)
-    posterior = NoisyPosterior(
-        linear.unknowns, named, np.full(DRAWS, NOISE_MM), 0, sampler="", ess_min=np.inf, rhat_max=1.0, steps=1,
-        autocorrelation_time=0.0, sizes=sizes.noise,
-    )  # fmt: skip
-    every = [of_recording.slopes(NO_DOUBT), of_factors(model, posterior, of_recording.factors, NO_DOUBT)]
-    half = np.where(np.arange(DRAWS)[:, None] % 2, alone, drawn)
-    rows, seen = rows_of(model.artefact), np.hstack([shown_by(model, one) for one in field.effects])
-    read = observed - linear.design[:, k:] @ linear.prior_mean[k:]
-    expected = half[:, :k] @ linear.design[:, :k].T + half[:, k:] @ seen.T
-    assert rows is not None
-    if model.artefact.rows.shape[1] == 1:
-        at = np.empty(len(model.artefact.points), dtype=np.int64)
-        at[model.artefact.rows[:, 0]] = np.arange(len(read))
-        (first, last) = at[rows].T
-        read, expected = read[last] - read[first], expected[:, last] - expected[:, first]
-    performance = MachinePerformance(model.artefact.points, rows, 1e3 * expected, 1e3 * read, of_bar=True)
-    noise = stated_noise(model, field.field.noise, sizes.noise)
-    return _told(held_together([*every, of_lengths(performance, model, noise, NO_DOUBT)]))
+
+    figures: np.ndarray
+    kinds: tuple[str, ...]
+    own: np.ndarray
+    root: np.ndarray
+    inverse: np.ndarray
+
+
+@cache
+def dense(artefact: str, number: int) -> Dense:
+    """Of places of their own, as on a machine without errors, with noise of known size."""
+    one, none = machines.Cell(artefact, "stated", 0.0), truth.Truth.of_six(dict.fromkeys(truth.SIX, 0.0))
+    random = np.random.default_rng([number, 17])
+    model = RecordingModel(machines.calibrated(one, none, 0.0, 0.0, random), machines.NAMED, NOISE_MM)
+    linear, whole = model.estimate().linear, RecordedField.of(model, other_errors(model)).field
+    k, m, placing = 6, len(linear.observed), linear.freedoms.dense()
+    N = scipy.linalg.null_space(placing.T) if placing.size else np.eye(m)
+    shown = linear.design * linear.prior_sd
+    own = NOISE_MM**2 * np.diag(linear.noise_scale**2) + shown[:, k:] @ shown[:, k:].T
+    covariance = {name: np.zeros((m, m)) for name in (None, *whole.families)}
+    covariance[None] = own + shown[:, :k] @ shown[:, :k].T
+    for each in whole.errors:
+        columns = each.columns if each.impulse is None or each.covariance is None else each.impulse
+        tied = np.eye(columns.shape[1]) if each.covariance is None else each.covariance
+        covariance[each.family] += columns @ tied @ columns.T
+    sizes = np.abs(random.standard_normal((SIZES, len(whole.families))))
+    parts = np.stack([N.T @ covariance[name] @ N for name in whole.families])
+    K = N.T @ covariance[None] @ N + np.einsum("sf,fij->sij", sizes**2, parts)
+    rows, lines = rows_of(model.artefact), np.array([weights for _, weights in lines_of(model)])
+    lengths = np.eye(m)
+    if model.artefact.rows.shape[1] == 1 and rows is not None:  # observed is each face
+        lengths = lengths[rows[:, 1]] - lengths[rows[:, 0]]
+    every = [gain(linear, NOISE_MM)[:k], lines, lengths]
+    kinds = [kind for kind, some in zip(KINDS, every, strict=True) for _ in some]
+    return Dense(np.vstack(every) @ N, tuple(kinds), N.T @ own @ N, np.linalg.cholesky(K), np.linalg.inv(K))
+
+
+@cache
+def _linear(artefact: str, seed: int, places: int) -> list[dict[str, Any]]:
+    """Machines of the priors, their noise known: sizes that they may have are weighed by what each shows, all else is exact.
+
+    What was read less what is expected of it is Λ·E[ε | y], with ε noise and artefact.
+    """
+    of, random = dense(artefact, places), np.random.default_rng([seed, places, 23])
+    size, count = of.root.shape[1], len(of.kinds)
+    n = np.stack([of.root[random.integers(SIZES)] @ random.standard_normal(size) for _ in range(ALIKE)], axis=1)
+    seen = of.inverse @ n
+    logs = -0.5 * np.sum(seen * n, axis=1) - np.log(np.diagonal(of.root, axis1=1, axis2=2)).sum(axis=1)[:, None]
+    weights = np.exp(logs - logs.max(axis=0))
+    weights /= weights.sum(axis=0)
+    shown, kinds = of.figures @ of.own, np.array(of.kinds)
+    u, z = np.einsum("qi,qi->q", shown, of.figures), float(scipy.special.ndtri(1 - 0.5 * DISAGREES / count))
+    found = []
+    for i, weight in enumerate(weights.T):
+        most = np.flatnonzero(weight > 1e-4)
+        off = seen[most, :, i] @ shown.T  # (s, q) for each of the sizes
+        mean, known = weight[most] @ off, np.tensordot(weight[most], of.inverse[most], axes=1)
+        together = u - np.einsum("qi,qi->q", shown @ known, shown) + weight[most] @ (off - mean) ** 2
+        ratio = np.abs(mean) / (z * np.sqrt(u + together))
+        worst = {kind: float(ratio[kinds == kind].max()) for kind in KINDS}
+        told = {"ratios": worst, "figures": count, "disagree": int(np.sum(ratio > 1))}
+        found.append({**told, "sizes": float(1 / np.sum(weight**2))})
+    return found
 
 
 def wronged(artefact: Any, wrong: str, size: float, random: np.random.Generator) -> Any:

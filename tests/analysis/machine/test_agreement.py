@@ -8,13 +8,15 @@ from functools import partial
 
 import numpy as np
 import pytest
+import scipy
 
 from benchmarks.parts import agreement as study, machines, truth
 from cmm_uq.analysis.machine import agreement as room
 from cmm_uq.analysis.machine.agreement import Agreement, Figures, RecordedDraws, held_together
+from cmm_uq.analysis.machine.conditional import RecordedField, white
 from cmm_uq.analysis.machine.correction import FieldMap, field_map
 from cmm_uq.analysis.machine.performance import MachinePerformance, rows_of
-from cmm_uq.analysis.machine.regions import DrawnErrors, FactorRegions
+from cmm_uq.analysis.machine.regions import DrawnErrors, FactorRegions, other_errors
 from cmm_uq.analysis.machine.state import StatedNoise
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats
@@ -25,6 +27,8 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.machine.physics.compensation import Compensation
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
+from cmm_uq.maths.inference.family_sizes import sample_sizes
+from cmm_uq.maths.inference.linear_model import solve
 from cmm_uq.maths.inference.noise import Sizes
 from cmm_uq.maths.inference.posterior import Cause, Doubt
 from tests.analysis.machine.test_performance import three_bars
@@ -234,3 +238,41 @@ def test_a_machine_of_the_stated_priors_is_drawn_as_the_page_has_them() -> None:
 def test_a_machine_of_the_priors_agrees_and_a_wrong_sign_does_not(artefact: str, wrong: str) -> None:
     record = study.measured((study.Cell(0, artefact, "white", wrong), 1, 0))
     assert (max(record["ratios"].values()) > 1) == (wrong != "nothing")
+
+
+@pytest.mark.long(but="bars")
+@pytest.mark.parametrize("artefact", ["bars", "step gauge"])
+def test_slopes_by_the_draws_are_those_of_whole_matrices(artefact: str) -> None:
+    """A recording drawn from the linear model, its noise known: sizes drawn from their priors and weighed, and whole
+    covariances, beside the draws of the package. Means agree to a fifth of u; a sign would move them by twenty."""
+    of, random = study.dense(artefact, 1), np.random.default_rng(8)
+    n = of.root[11] @ random.standard_normal(of.root.shape[1])
+    seen = of.inverse @ n
+    logs = -0.5 * seen @ n - np.log(np.diagonal(of.root, axis1=1, axis2=2)).sum(axis=1)
+    weight = np.exp(logs - logs.max()) / np.exp(logs - logs.max()).sum()
+    lines = [i for i, kind in enumerate(of.kinds) if kind == "line"]
+    figures = of.figures[lines]
+    expected = 1e6 * (figures @ n - figures @ of.own @ (weight @ seen))
+
+    none = truth.Truth.of_six(dict.fromkeys(truth.SIX, 0.0))
+    cell = machines.Cell(artefact, "stated", 0.0)
+    made = machines.calibrated(cell, none, 0.0, 0.0, np.random.default_rng([1, 17]))
+    model = RecordingModel(made, machines.NAMED, study.NOISE_MM)
+    estimate = model.estimate()
+    placing = estimate.linear.freedoms.dense()
+    N = scipy.linalg.null_space(placing.T) if placing.size else np.eye(len(placing))
+    known, prior = estimate.linear.design[:, 6:], estimate.linear.prior_mean[6:]
+    linear = replace(estimate.linear, observed=N @ n + known @ prior)
+    found, sigma = solve(linear), white(study.NOISE_MM)
+    model.__dict__["_estimate"] = replace(estimate, least_squares=found, linear=linear)
+    whole = RecordedField.of(model, other_errors(model))
+    field = replace(whole, field=replace(whole.field, linear=linear, estimate=found))
+    sizes = sample_sizes(field.field, 4000, 1, sigma)
+    drawn = field.coefficients(sizes.noise, sizes.families, random)
+    own, further = np.split(drawn, [field.modelled], axis=1)
+    slopes = RecordedDraws(model, np.arange(6), own, field.effects, further, sizes.noise, study.NOISE_MM).slopes(
+        NO_DOUBT
+    )
+    np.testing.assert_allclose(slopes.stated, 1e6 * figures @ n, atol=1e-6)
+    assert np.abs(slopes.together - expected).max() < 0.2 * slopes.u.min()
+    assert np.abs(slopes.stated).min() > 10
