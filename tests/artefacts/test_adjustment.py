@@ -11,10 +11,13 @@ from hypothesis import given, settings, strategies as st
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.artefacts.adjustment import adjustments, turns
+from cmm_uq.artefacts.adjustment import AdjustmentSetting, adjustments, turns
 from cmm_uq.artefacts.ballbar import results
+from cmm_uq.base.messages import NOTHING
+from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.machine.physics.kinematics import KinematicChain, exact
+from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.reading import number
 from tests.artefacts.simulated import SQUARE, analysed, blocks, recovered, table
 
@@ -109,6 +112,17 @@ def test_the_ram_rides_on_the_carriage_that_carries_it(chain: str, rides: bool) 
     assert KinematicChain.of(chain).rides("z", on="y") is rides
 
 
+@pytest.mark.parametrize(
+    ("ends", "beyond"),
+    [((-1.0, 0.5), False), ((0.5, 2.0), True), ((-2.0, -0.5), True), ((-1.0, 0.0), False), ((0.0, 1.0), False)],
+)
+def test_a_setting_is_beyond_doubt_where_its_interval_leaves_zero_out(
+    ends: tuple[float, float], *, beyond: bool
+) -> None:
+    figure = Quantity(sum(ends) / 2, 1.0, ends, unit("ppm"))
+    assert AdjustmentSetting("scale_x", NOTHING, "ppm", figure, None).beyond_doubt is beyond
+
+
 WHAT = "What to turn and what to enter"
 SECOND_WAY = "The six factors by the distance equations, a second way"
 
@@ -148,7 +162,9 @@ def test_an_uncalibrated_bar_gives_no_scale_to_enter() -> None:
     assert [row[0] for row in rows] == [
         "Guide of Y: turn about +Z by", "Guide of Z: turn about +X by", "Guide of Z: turn about +Y by",
     ]  # fmt: skip
-    assert [row[4] for row in table("bryan-simulated", SECOND_WAY).rows[:3]] == ["not determined"] * 3
+    second = table("bryan-simulated", SECOND_WAY).rows
+    assert [row[4] for row in second[:3]] == ["not determined"] * 3
+    assert [row[1] == "not determined" for row in second] == [True] * 3 + [False] * 3
     notes = [block.text for block in blocks("iota-1102-20C-compensated") if isinstance(block, Paragraph)]
     assert any("The length of the bar is not certified" in note for note in notes)
 
