@@ -35,7 +35,7 @@ def reported(chain: str) -> tuple[dict[str, Any], Points, Report]:
         return machine, read_job(job).points, cmm_uq.report(job, seed=1)
 
 
-@pytest.mark.long(but="XYZ-CA")
+@pytest.mark.long(but="XYZ|AC")
 @pytest.mark.parametrize("chain", CHAINS)
 def test_location_tilt_positioning_and_play_of_both_axes_are_estimated(tmp_path: Path, chain: str) -> None:
     """Twenty-two numbers within 3 u, and the location of each axis named with its U."""
@@ -85,6 +85,7 @@ def test_ranges_are_those_of_polar_coordinates_about_the_axis_that_turned() -> N
             assert one[f"{name}_um"] == pytest.approx(1e3 * np.ptp((xyz - middle) @ unit), abs=1e-6)
 
 
+@pytest.mark.long(but="XYZ|AC")
 @pytest.mark.parametrize("chain", CHAINS)
 def test_by_angle_is_the_mean_and_the_scatter_of_what_was_seen_there(chain: str) -> None:
     _, points, report = reported(chain)

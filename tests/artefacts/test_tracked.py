@@ -8,25 +8,27 @@ import io
 import re
 import shutil
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cmm_uq.app.commands.jobs.new import job_of_export, new_job, write_new
+from cmm_uq.app.commands.jobs.new import job_of_export, new_job
 from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.parts.part import write_part
-from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.report import evaluate_job, report_outcome, write_report
+from cmm_uq.app.commands.reading import job_of
+from cmm_uq.app.commands.report import REPORT, evaluate_job, report_outcome
 from cmm_uq.artefacts.optical import tracked
 from cmm_uq.artefacts.optical.tracked import TrackedPoints, predicted_poses
 from cmm_uq.base.arm import THETA, Arm
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.stated import physics_of
+from tests.artefacts.simulated import outcome
 from tests.conftest import ROOT
 
 EXAMPLES = ROOT / "examples"
@@ -153,12 +155,16 @@ def test_play_that_the_model_leaves_out_is_named() -> None:
     assert [one.effect for one in diagnosis.effects] == ["slack_q1"]
 
 
-def test_the_certificate_has_the_rows_as_found(tmp_path: Path) -> None:
-    write_new("tracked_points", tmp_path / "robot", {})
-    outcome = report_outcome(read_job(tmp_path / "robot"))
-    rows = outcome.results["rows"]
+@cache
+def reported() -> Outcome:
+    return report_outcome(robot())
+
+
+def test_the_certificate_has_the_rows_as_found() -> None:
+    results = reported().results
+    rows = results["rows"]
     assert [row["d_mm"] for row in rows][::5] == [475.0, 85.0]  # what is not named, or open, stands as it was
-    value = outcome.results["estimates"]["length_q2"]["um"]["value"]
+    value = results["estimates"]["length_q2"]["um"]["value"]
     assert_allclose(rows[1]["a_mm"], 600.0 + value / 1000, atol=1e-9)
 
 
@@ -174,16 +180,16 @@ def test_a_job_of_an_export_names_effects_that_its_arm_has() -> None:
 
 
 def test_no_part_is_evaluated_by_the_certificate_of_an_arm(tmp_path: Path) -> None:
-    write_report(EXAMPLES / "robot-simulated", tmp_path / "machine")
     shutil.copytree(EXAMPLES / "part-plate-simulated", tmp_path / "part")
-    shutil.copy(tmp_path / "machine" / "certificate-simulated.pdf", tmp_path / "part" / "machine")
+    certificate = REPORT.contents(outcome("robot-simulated"))["certificate-simulated.pdf"]
+    (tmp_path / "part" / "machine" / "certificate-simulated.pdf").write_bytes(certificate)
     with pytest.raises(CmmUqError, match="the machine's certificate is of an arm"):
         write_part(tmp_path / "part", tmp_path / "out")
 
 
 def test_a_robot_by_screw_axes_is_the_one_by_its_rows_and_its_axes_are_found() -> None:
     """The same robot stated either way leaves the same distances, and its screw axes are found."""
-    by_rows = robot()
+    by_rows, other = robot(), reported().found
     arm = by_rows.points.machine
     assert isinstance(arm, Arm)
     home = arm.at(np.zeros((1, 6)))
@@ -196,7 +202,7 @@ def test_a_robot_by_screw_axes_is_the_one_by_its_rows_and_its_axes_are_found() -
     stated = f"[machine.arm]\nhome = {frame}\ntool_mm = {arm.tool_mm.tolist()}\n{axes}\n[artefact]"
     job = job_of({**FILES, "job.toml": text.replace("[artefact]", stated, 1).encode()})
     assert_allclose(job.points.xyz, by_rows.points.xyz, atol=1e-4)  # as recorded
-    result, other = evaluate_job(job), evaluate_job(by_rows)
+    result = evaluate_job(job)
     assert isinstance(result, Result)
     assert isinstance(other, Result)
     positions, same = tracked.results(result)["positions"], tracked.results(other)["positions"]

@@ -283,6 +283,7 @@ SIZES = np.array([300.0] * 3 + [500.0] * 3 + [0.1] * 3)
 """Of scales, squarenesses and offsets, by which a criterion compares them: ppm, ″, mm."""
 
 
+@pytest.mark.long(but="D")
 @pytest.mark.parametrize("criterion", ["D", "A"])
 def test_a_plan_by_criterion_tells_offset_and_factors_from_fewer_bars(tmp_path: Path, criterion: str) -> None:
     """Twelve bars that are chosen beside the first twelve of the usual plan, each end in one of three attitudes."""
