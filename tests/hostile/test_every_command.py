@@ -23,6 +23,12 @@ from tests.app.cli.process import run
 from tests.conftest import ROOT
 
 
+@pytest.fixture(autouse=True)
+def passphrase(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Laying files out sets it for commands that are started; no other test finds it."""
+    monkeypatch.setenv("CMM_UQ_SIGN_PASSPHRASE", "open")
+
+
 def test_no_command_is_without_cases() -> None:
     assert sorted({line.command for line in LINES}) == commands()
 
