@@ -22,6 +22,7 @@ from cmm_uq.certificate.origin import CERTIFICATE
 from cmm_uq.certificate.wording import NO_FACTOR, expanded
 from cmm_uq.jobs.chain import TraceabilityChain, chain_of, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.part.tables import PartFile
 from cmm_uq.jobs.recording.beside import ShortGaugeFacts
 from cmm_uq.jobs.recording.compared import OF_POINTS
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts, Traceability
@@ -307,6 +308,18 @@ def of_every_report(
         _where("7.8.2.2", "data from the customer, and that the laboratory does not answer for them", job.from_customer,
                "[job] from_customer"),
     )  # fmt: skip
+
+
+PART_TITLE = say("Measurement report")
+
+
+def of_a_part(facts: PartFile) -> tuple[Requirement, ...]:
+    """What is asked of the report of a part; nothing of one that is an example's or simulated."""
+    if facts.job.origin != MEASURED:
+        return ()
+    item = asked("7.8.2.1 g", say("serial number of the part"), facts.part.serial, "[part] serial")
+    conditions = asked("7.8.4.1 b", say("conditions"), facts.job.conditions, "[job] conditions")
+    return (*of_every_report(facts.job, facts.laboratory, PART_TITLE, item), conditions)
 
 
 def _of_a_calibration(of: Job) -> tuple[Requirement, ...]:

@@ -370,16 +370,19 @@ class Part(NotebookView):
     def compose(self) -> Document:
         return document_of(self.found)
 
-    def write(self, folder: str | Path | None = None, *, force: bool = False) -> dict[str, Path]:
+    def write(
+        self, folder: str | Path | None = None, *, force: bool = False, records: str | Path | None = NONE
+    ) -> dict[str, Path]:
         """Write the files that ``cmm-uq part`` writes, all or none.
 
         Parameters
         ----------
         folder : to write to; ``reports/<job id>`` where none is given.
         force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+        records : file or URL of the records that it is kept in; ``none`` for none, ``None`` for those that the command takes.
         """
         out = None if folder is None else Path(folder)
-        return dict(written(self.job, lambda: self.found, out, force=force).files)
+        return dict(written(self.job, lambda: self.found, out, force=force, records=records).files)
 
     def __repr__(self) -> str:
         said = [f"{len(self.found.stated)} characteristics", *filter(None, [self.found.outcome])]

@@ -179,8 +179,8 @@ def part(
         None, "Certificates that you trust, PEM or DER: the machine's certificate must then be signed.", "FILE|DIR",
         "nobody"),
     records: str | None = option(
-        None, "Records of the machine's history, from which its drift is known: a file, a postgresql:// URL, or none.",
-        "WHERE", "none"),
+        None, "Records that the report is kept in, a file, a postgresql:// URL, or none; once named, the machine's drift is "
+        "known from its history in them.", "WHERE", "$CMM_UQ_RECORDS, else reports/records.db, without drift"),
     end: Ending = opt.ending(DOCUMENTS, "unless every characteristic conforms"),
 ) -> None:  # fmt: skip
     """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
@@ -188,7 +188,9 @@ def part(
         from cmm_uq.app.commands.parts.part import PartOptions, write_part
 
         options = PartOptions(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
-        written = write_part(job, out, options=options, force=end.force, stage=stage, language=end.language)
+        written = write_part(
+            job, out, options=options, force=end.force, stage=stage, language=end.language, records=records
+        )
     conclude(written, end)
 
 

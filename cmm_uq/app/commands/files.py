@@ -21,6 +21,7 @@ from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
 from cmm_uq.laboratory.records.facts import BEGINNING, KEY, ChainHead, Heads
 from cmm_uq.laboratory.records.opening import open_records
@@ -53,10 +54,10 @@ def opened(
 
 
 def ledger_of(
-    records: Records, job: Job, command: str, folder: Path, files: Mapping[str, bytes], results: str
+    records: Records, job: Job | PartJob, command: str, folder: Path, files: Mapping[str, bytes], results: str
 ) -> Ledger:
     hashes = {name: sha256(data).hexdigest() for name, data in files.items()}
-    with physics_of(job):
+    with physics_of(job if isinstance(job, Job) else None):
         content = content_of(records.home, files[results], job, command, folder, hashes)
     return records.ledger(kind_of_entry(content), content)
 
@@ -77,8 +78,39 @@ class LateLedger:
         self._begun().forget(token)
 
 
+@dataclass(frozen=True)
+class RecordsToKeep:
+    """The records that a command keeps what it writes in: ``at`` is ``None`` for none, ``known`` where none are there yet."""
+
+    at: str | Path | None
+    known: Records | None
+    made: contextlib.ExitStack
+
+    def heads(self, owner: Owner) -> Heads:
+        """Where a document that is now made may say that they stand."""
+        if self.at is None:
+            return NOT_RECORDED
+        return (
+            Heads(ChainHead(0, BEGINNING, None)) if self.known is None else self.known.heads(owner.command, owner.job)
+        )
+
+    def ledger(self, ledger: Callable[[Records], Ledger]) -> Ledger | None:
+        if (at := self.at) is None:
+            return None
+        return LateLedger(lambda: ledger(self.known or self.made.enter_context(open_records(at, create=True))))
+
+    def said(self, how: str = "") -> str:
+        return "" if self.at is None else f"Recorded in {shown(self.at)}{how}."
+
+
+@contextlib.contextmanager
+def kept_in(where: str | Path | None, out: Path | None) -> Iterator[RecordsToKeep]:
+    with opened(where, out, make=False) as known, contextlib.ExitStack() as made:
+        yield RecordsToKeep(place_of(where, of_folder(out)), known, made)
+
+
 def content_of(
-    home: Path | None, results: bytes, job: Job | None, command: str, folder: Path, files: Mapping[str, str]
+    home: Path | None, results: bytes, job: Job | PartJob | None, command: str, folder: Path, files: Mapping[str, str]
 ) -> dict[str, Any]:
     """Content of the entry of a results.json; see :func:`cmm_uq.laboratory.records.content.certificate_content`."""
     return certificate_content(
@@ -170,30 +202,21 @@ class Form:
         expected = (*self.names(job), RESULTS, *self.further)
         where = records if self.recorded else NONE
         with (
-            opened(where, out, make=False) as known,
-            contextlib.ExitStack() as made,
+            kept_in(where, out) as kept,
             staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
         ):
             found = outcome()
-            at = place_of(where, of_folder(out))
-            empty = NOT_RECORDED if at is None else Heads(ChainHead(0, BEGINNING, None))
-            heads = empty if known is None else known.heads(self.command, owner.job)
             language = job.facts.job.language
             finished: Finished = unchanged
             if signing is not None:
                 laboratory = job.facts.laboratory.model_dump()
                 finished = signing.finished(laboratory, language=language, said=lambda text: said_in(text, language))
-            contents = self.contents(found, stage, finished=finished, heads=heads)
+            contents = self.contents(found, stage, finished=finished, heads=kept.heads(owner))
             stage(f"Writing: {len(contents)} files to {folder}", 0.95)
-
-            def begun() -> Ledger:
-                history = known or made.enter_context(open_records(at, create=True))
-                return ledger_of(history, job, self.command, folder, contents, RESULTS)
-
-            files = place.write(contents, ledger=None if at is None else LateLedger(begun))
+            ledger = kept.ledger(lambda history: ledger_of(history, job, self.command, folder, contents, RESULTS))
+            files = place.write(contents, ledger=ledger)
             by_name = "; the machine has no [machine] serial and is known by its name"
-            how = "" if job.facts.machine.serial else by_name
-            recorded = "" if at is None else f"Recorded in {shown(at)}{how}."
+            recorded = kept.said("" if job.facts.machine.serial else by_name)
         stage("Done", 1.0)
         ends = (found.summary, found.conforming, job.facts.job.id, job.origin, recorded)
         return Written(found, contents[RESULTS], files, *ends)

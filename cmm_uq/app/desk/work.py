@@ -88,7 +88,7 @@ def report(job: str, tell: Tell) -> dict[str, Any]:
         tell({"what": what, "part": part})
 
     if is_part(content_of(folder / "job.toml", JOB_BYTES, "")):
-        of_part = write_part(folder, options=PartOptions(), stage=stage)
+        of_part = write_part(folder, options=PartOptions(), stage=stage, records=None)
         return {"id": of_part.name, "sha256": "", "field": None}
     written = write_report(folder, stage=stage, records=None)
     return {"id": written.name, "sha256": sha256(written.results).hexdigest(), "field": vectors(written)}

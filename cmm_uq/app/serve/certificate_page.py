@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from cmm_uq.app.serve import page as p
 from cmm_uq.app.serve.exchange import MEDIA, RefusedRequest, WebRequest, WebResponse, sent_file
 from cmm_uq.app.serve.trends import values_table
-from cmm_uq.app.serve.view import SiteView, machine_cell
+from cmm_uq.app.serve.view import SiteView, machine_cell, part_cell
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, number, say
 from cmm_uq.base.output.manifest import plain_name, read_manifest
@@ -26,7 +26,7 @@ from cmm_uq.certificate.document import Standing
 from cmm_uq.certificate.wording import effect_of, effect_title, probability, size_of
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import unit_of
-from cmm_uq.laboratory.records.facts import Entry, RecordedCertificate
+from cmm_uq.laboratory.records.facts import PART, Entry, RecordedCertificate
 from cmm_uq.laboratory.records.listing import entry_of
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
@@ -40,7 +40,8 @@ def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
     decided, standing = decided_words(one)
     stated = Verdicts.of_results(entry.data)
     return p.page(
-        "certificate.html", "/certificates", one=one, entry=entry, machine=machine_cell(one.machine), decided=decided,
+        "certificate.html", "/parts" if one.command == PART else "/certificates", one=one, entry=entry,
+        machine=machine_cell(one.machine), decided=decided, part=part_cell(entry.data) if one.command == PART else None,
         origin=None if one.origin == "measured" else p.ORIGINS.get(one.origin, Verbatim(one.origin)), standing=standing,
         warning=p.NOT_MEASURED.get(one.origin), decision=p.cell_of(p.DECISIONS, one.decision),
         outcomes=[(f"{each.by}, {each.name}" if each.by else each.title or each.name, p.cell_of(p.DECISIONS, each.outcome))
@@ -81,7 +82,7 @@ def _named(view: SiteView, request: WebRequest) -> tuple[RecordedCertificate, En
 
 def decided_words(one: RecordedCertificate) -> tuple[Text, Standing]:
     """What it decides and whether it holds, taken together as the worse of both; nothing of a diagnosis."""
-    if one.command != "report":
+    if one.command == "diagnose":
         return NOTHING, "open"
     state, stands = p.STATES.get(one.state, (Verbatim(one.state), "open"))
     decision, conforms = p.DECISIONS.get(one.decision, (Verbatim(one.decision), "open"))

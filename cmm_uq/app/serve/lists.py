@@ -1,4 +1,4 @@
-"""Lists of machines, certificates, diagnoses and artefacts, chosen by what a reader asks, and the page of a machine."""
+"""Lists of machines, certificates, diagnoses, parts and artefacts, chosen by what a reader asks, and the page of a machine."""
 
 from __future__ import annotations
 
@@ -44,23 +44,30 @@ def _days(request: WebRequest) -> tuple[dt.date | None, dt.date | None]:
 
 def certificates_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     request.only(_KEYS)
+    choice = _choice(request, "report")
+    rows, total = v.paged(view.records, choice, request)
+    count = plural(total, one=say("1 certificate"), many=say("{count} certificates", count=number(total, ",d")))
+    none = say("No certificate of a measurement is recorded yet.")
+    table = v.certificates_table(rows, count, say("No certificate is as chosen.") if _narrowed(request) else none)
+    return _list("certificates.html", request, table, total, **_choices(choice.origin))
+
+
+def _choice(request: WebRequest, command: str) -> CertificateFilter:
     text, machine, artefact = (request.text(name) for name in ("text", "machine", "artefact"))
     origin = request.one_of("origin", tuple(p.ORIGINS)) or "measured"
     state = request.one_of("state", facts.STATES)
     decision = request.one_of("decision", tuple(p.DECISIONS))
     since, until = _days(request)
-    choice = CertificateFilter(
-        text=text, machine=machine, artefact=artefact, origin=origin, states=(state,) if state else (),
+    return CertificateFilter(
+        text=text, machine=machine, artefact=artefact, origin=origin, command=command, states=(state,) if state else (),
         decisions=(decision,) if decision else (), since=since, until=until,
     )  # fmt: skip
-    rows, total = v.paged(view.records, choice, request)
-    count = plural(total, one=say("1 certificate"), many=say("{count} certificates", count=number(total, ",d")))
-    none = say("No certificate of a measurement is recorded yet.")
-    table = v.certificates_table(rows, count, say("No certificate is as chosen.") if _narrowed(request) else none)
-    return _list(
-        "certificates.html", request, table, total, origin=origin, warning=p.NOT_MEASURED.get(origin),
-        states=_options(p.STATES), decisions=_options(p.DECISIONS), origins=p.ORIGINS.items(),
-    )  # fmt: skip
+
+
+def _choices(origin: str) -> dict[str, Any]:
+    """What can be chosen, and a warning where nobody measured."""
+    return {"origin": origin, "warning": p.NOT_MEASURED.get(origin), "states": _options(p.STATES),
+            "decisions": _options(p.DECISIONS), "origins": p.ORIGINS.items()}  # fmt: skip
 
 
 def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
@@ -83,6 +90,18 @@ def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     )
     table = p.PageTable(count, headings, cells, say("There is none."))
     return _list("diagnoses.html", request, table, total, verdicts=_options(p.VERDICTS))
+
+
+def parts_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
+    """Reports of parts, with the machine that measured each and its certificate."""
+    request.only(tuple(name for name in _KEYS if name != "artefact"))
+    choice = _choice(request, facts.PART)
+    rows, total = v.paged(view.records, choice, request)
+    count = plural(
+        total, one=say("1 report of a part"), many=say("{count} reports of parts", count=number(total, ",d"))
+    )
+    table = v.parts_table(view.records, rows, count, say("There is none."))
+    return _list("parts.html", request, table, total, **_choices(choice.origin))
 
 
 ARTEFACT_COLUMNS = p.columns(
@@ -213,10 +232,13 @@ def machine_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     listed, count = chosen(view.records, CertificateFilter(machine=machine.serial), LISTED)
     caption = say("The newest {shown} of {count}", shown=number(len(listed)), count=number(count, ",d"))
     table = v.certificates_table(listed, caption, say("No measured certificate is recorded."), machine=False)
+    measured, parts = chosen(view.records, CertificateFilter(machine=machine.serial, command=facts.PART), LISTED)
+    caption = say("The newest {shown} of {count}", shown=number(len(measured)), count=number(parts, ",d"))
+    parts_table = v.parts_table(view.records, measured, caption, say("No report of a part is recorded."), machine=False)
     charts, once = trends(view.records, machine)
     return p.page(
         "machine.html", "/", machine=machine, charts=charts, once=once, certificates=table,
-        due=None if standing is None else due_cell(standing),
+        parts=parts_table if measured else None, due=None if standing is None else due_cell(standing),
         newest=None if newest is None else v.certificate_cell(newest),
         adjusted=commas(day(one) for one in machine.adjusted),
         words=[] if standing is None else [_group_words(standing, name) for name in standing.groups],

@@ -27,7 +27,14 @@ from cmm_uq.app.serve import page as p, view as v
 from cmm_uq.app.serve.application import Answer, Application, routed
 from cmm_uq.app.serve.certificate_page import certificate_page, files_of, recorded_file
 from cmm_uq.app.serve.exchange import LARGEST, RefusedRequest, UploadedFile, WebRequest, WebResponse, read_dropped, to
-from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page, machine_page, machines_page
+from cmm_uq.app.serve.lists import (
+    artefacts_page,
+    certificates_page,
+    diagnoses_page,
+    machine_page,
+    machines_page,
+    parts_page,
+)
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, plural, say
 from cmm_uq.certificate.document import Standing
@@ -39,6 +46,7 @@ from cmm_uq.laboratory.records.store import Records
 
 MOST_CERTIFICATES = 50  # of one number that are compared: it is issued once, and drafted a few times
 
+_SCHEMAS = ("cmm-uq/results/", "cmm-uq/part/")
 _OF_PAGE = re.compile(rb'class="number">[^<]{0,40}<bdi>([^<]{1,300})</bdi>')
 _OF_PDF = re.compile(rb"<pdf:Keywords>([^<]{1,300})</pdf:Keywords>")
 
@@ -80,7 +88,7 @@ def number_in(content: bytes) -> str:
     if not content.startswith(b"%PDF") and content.lstrip()[:1] == b"{":
         try:
             data = json.loads(content)
-            return str(data["job"]["id"]) if str(data["schema"]).startswith("cmm-uq/results/") else ""
+            return str(data["job"]["id"]) if str(data["schema"]).startswith(_SCHEMAS) else ""
         except (ValueError, KeyError, TypeError, RecursionError):
             return ""
     found = (_OF_PDF if content.startswith(b"%PDF") else _OF_PAGE).search(content)
@@ -133,7 +141,7 @@ def verdict(known: FileMatch) -> CheckVerdict:
         "replaced": (say("Known, but replaced by another certificate: do not rely on it"), "bad"),
     }
     head, standing = heads.get(one.state, (say("Known; its state is {state}", state=Verbatim(one.state)), "open"))
-    if one.command != "report":
+    if one.command == "diagnose":
         head, standing = say("Known: a diagnosis, which is no certificate"), "open"
     lines = [say("Its bytes are those that were recorded.")]
     if (warning := p.NOT_MEASURED.get(one.origin)) is not None:
@@ -189,8 +197,8 @@ def comparing(view: v.SiteView, request: WebRequest) -> WebResponse:
 
 PAGES: Mapping[str, Callable[[v.SiteView, WebRequest], Answer]] = {  # what is looked at, by path
     "/": machines_page, "/machine": machine_page, "/certificates": certificates_page, "/certificate": certificate_page,
-    "/diagnoses": diagnoses_page, "/artefacts": artefacts_page, "/recorded": recorded_file, "/file": file_page,
-    "/integrity": integrity_page,
+    "/diagnoses": diagnoses_page, "/parts": parts_page, "/artefacts": artefacts_page, "/recorded": recorded_file,
+    "/file": file_page, "/integrity": integrity_page,
 }  # fmt: skip
 FORMS: Mapping[str, Callable[[v.SiteView, WebRequest], Answer]] = {
     "/file": dropped_page, "/integrity/chain": comparing, "/integrity/files": comparing,

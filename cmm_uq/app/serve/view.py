@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from cmm_uq.app.commands.laboratory.due import due_in
 from cmm_uq.app.serve import page as p
@@ -18,7 +18,14 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.due.due import DueItem
 from cmm_uq.laboratory.records.facts import ChainFinding
-from cmm_uq.laboratory.records.listing import CertificateFilter, ListedCertificate, Newest, chosen, standing_of_all
+from cmm_uq.laboratory.records.listing import (
+    CertificateFilter,
+    ListedCertificate,
+    Newest,
+    chosen,
+    contents,
+    standing_of_all,
+)
 from cmm_uq.laboratory.records.store import Records
 
 MOST = 100  # findings that are shown
@@ -99,7 +106,7 @@ def machine_cell(serial: str, name: str = "") -> Cell:
 
 
 def certificate_cell(one: ListedCertificate) -> Cell:
-    note = say("interim check") if one.interim else say("diagnosis") if one.command != "report" else NOTHING
+    note = say("interim check") if one.interim else say("diagnosis") if one.command == "diagnose" else NOTHING
     return Cell(p.shown(one.number or one.job), address("/certificate", entry=one.entry), note=note)
 
 
@@ -121,6 +128,33 @@ def certificates_table(
     ]  # fmt: skip
     shown = tuple(tuple(row[i] for i in columns) for row in cells)
     return PageTable(caption, tuple(COLUMNS[i] for i in columns), shown, empty)
+
+
+PART_COLUMNS = p.columns(
+    say("Report"), say("Part"), say("Machine"), (say("Measured on"), "day"), say("Certificate of the machine"),
+    say("Decision"), say("State"),
+)  # fmt: skip
+
+
+def parts_table(
+    records: Records, rows: Sequence[ListedCertificate], caption: Text, empty: Text, *, machine: bool = True
+) -> PageTable:
+    """Reports of parts as rows; without their machine where all are of one."""
+    columns = [i for i in range(len(PART_COLUMNS)) if machine or i != 2]
+    said = dict(contents(records, [one.entry for one in rows]))
+    cells = [
+        (certificate_cell(one), part_cell(said[one.entry]), machine_cell(one.machine, one.machine_name), p.day_cell(one.day),
+         Cell(p.shown(said[one.entry]["certificate"]["number"])), p.cell_of(p.DECISIONS, one.decision),
+         p.cell_of(p.STATES, one.state))
+        for one in rows
+    ]  # fmt: skip
+    shown = tuple(tuple(row[i] for i in columns) for row in cells)
+    return PageTable(caption, tuple(PART_COLUMNS[i] for i in columns), shown, empty)
+
+
+def part_cell(content: Mapping[str, Any]) -> Cell:
+    part = content["part"]
+    return Cell(p.shown(part["name"]), note=Verbatim(" ".join(filter(None, (part["serial"], part["drawing"])))))
 
 
 Listed = TypeVar("Listed")

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
-from cmm_uq.base.messages import DASH, Text, Verbatim, day, plural, say, sentences
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, plural, say, sentences
 from cmm_uq.certificate import document as doc
 from cmm_uq.certificate.origin import attributes
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.laboratory.due.doubt import DoubtfulPeriod
 from cmm_uq.laboratory.due.history import MachineHistory
+from cmm_uq.laboratory.records.facts import MeasuredPart
 
 NOTE = say(
     "In doubt are parts that were measured from the last day that found the machine in order, by no certificate of after it "
-    "was so again; they are found by their reports, beside the records or in the folders that are named."
+    "was so again: those that are recorded, and those of other reports beside the records or in the folders that are named."
 )
+_CERTIFICATE = say("Certificate of the machine")
+HEADS = (say("Date"), say("Number"), say("Part"), say("Serial number"), _CERTIFICATE, say("Decision"), say("Folder"))
+LISTED = 100  # parts that are listed; the data have all
 
 
 def doubt_words(one: DoubtfulPeriod) -> Text:
@@ -38,33 +42,60 @@ def doubt_words(one: DoubtfulPeriod) -> Text:
     return sentences([found, since, again, known])
 
 
-def part_rows(history: MachineHistory) -> Iterator[tuple[Text, ...]]:
-    for one in (part for period in history.doubtful for part in period.parts):
+def doubtful_parts(history: MachineHistory) -> Iterator[MeasuredPart]:
+    return (part for period in history.doubtful for part in period.parts)
+
+
+def part_rows(parts: Iterable[MeasuredPart]) -> Iterator[tuple[Text, ...]]:
+    for one in parts:
         texts = one.number, one.part, one.serial, one.certificate
         outcome = OUTCOME_WORDS.get(one.outcome, DASH)
         yield day(one.day), *(Verbatim(text) if text else DASH for text in texts), outcome, Verbatim(one.folder)
 
 
 def doubt_section(history: MachineHistory) -> doc.Section:
-    certificate = say("Certificate of the machine")
-    heads = (say("Date"), say("Number"), say("Part"), say("Serial number"), certificate, say("Decision"), say("Folder"))
     words = (doc.Paragraph(doubt_words(one)) for one in history.doubtful)
-    parts = doc.table(say("Parts measured while the machine was in doubt"), heads, part_rows(history))
+    rows = part_rows(doubtful_parts(history))
+    parts = doc.table(say("Parts measured while the machine was in doubt"), HEADS, rows)
     note = doc.Paragraph(NOTE, "note") if history.doubtful else None
     return doc.section(say("In doubt"), *words, parts, note)
 
 
-def doubt_data(history: MachineHistory) -> list[dict[str, Any]]:
+def parts_section(history: MachineHistory) -> doc.Section:
+    """The newest first, as the records have them."""
+    newest = part_rows(history.parts[: -LISTED - 1 : -1])
+    caption = say("The newest {shown} of {count}", shown=min(LISTED, len(history.parts)), count=len(history.parts))
+    return doc.section(say("Parts measured on it"), doc.table(caption, HEADS, newest))
+
+
+def parts_words(history: MachineHistory) -> Text:
+    """How many the records have; empty without any."""
+    if not history.parts:
+        return NOTHING
+    last = history.parts[-1]
+    told = say("the newest of {day}: {number}", day=day(last.day), number=Verbatim(last.number))
+    count = len(history.parts)
+    single = say("The records have one report of a part measured on it, {newest}", newest=told)
+    return plural(
+        count,
+        one=single,
+        many=say("The records have {count} reports of parts measured on it, {newest}", count=count, newest=told),
+    )
+
+
+def part_data(part: MeasuredPart) -> dict[str, Any]:
     names = ("number", "part", "serial", "certificate", "outcome", "folder")
+    days = {"date": part.day.isoformat(), "calibrated": part.calibrated.isoformat()}
+    return attributes(part, *names) | days | ({"entry": part.entry} if part.entry else {})
+
+
+def doubt_data(history: MachineHistory) -> list[dict[str, Any]]:
     return [
         {
             "after": one.after and one.after.isoformat(),
             "found": {"entry": one.found.entry, "date": one.found.day.isoformat(), "interim": one.found.interim},
             "until": one.until and one.until.isoformat(),
-            "parts": [
-                attributes(part, *names) | {"date": part.day.isoformat(), "calibrated": part.calibrated.isoformat()}
-                for part in one.parts
-            ],
+            "parts": list(map(part_data, one.parts)),
         }
         for one in history.doubtful
     ]

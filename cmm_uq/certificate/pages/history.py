@@ -15,7 +15,7 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate import document as doc
 from cmm_uq.certificate.origin import attributes
-from cmm_uq.certificate.pages.doubt import doubt_data, doubt_section
+from cmm_uq.certificate.pages.doubt import doubt_data, doubt_section, part_data, parts_section
 from cmm_uq.certificate.plots.style import ACCENT, BAD, BAND, INK, MUTED, bars, dots, drawn, note, picture
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.verdicts import BEYOND, NONE
@@ -166,6 +166,7 @@ def history_data(history: MachineHistory) -> dict[str, Any]:
         "decision": history.decision,
         "remarks": [str.__str__(text) for text in history.remarks],
         **({"in_doubt": doubt_data(history)} if history.doubtful else {}),
+        **({"parts": list(map(part_data, history.parts))} if history.parts else {}),
         "certificates": [
             {**attributes(one, "entry", "job", "number"), "date": one.day.isoformat(),
              **attributes(one, "state", "decision", "diagnosis", "interim", "artefact"),
@@ -308,6 +309,7 @@ def history_document(history: MachineHistory) -> doc.Document:
         doc.section(say("Steps"), *map(doc.Paragraph, steps), *([doc.Paragraph(STEPS_NOTE)] if steps else ())),
         doc.section(say("Over time"), *(trend_plot(history, one) for one in history.values)),
         doc.section(say("Certificates and interim checks"), _certificates(history)),
+        parts_section(history),
     )
     subject = say("{name}, up to {on}", name=Verbatim(machine.name), on=day(history.on))
     return doc.program_page(

@@ -16,7 +16,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, holding,
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import certificate, document as doc
-from cmm_uq.certificate.clauses import STATEMENTS, Requirement, asked, not_stated, of_every_report
+from cmm_uq.certificate.clauses import PART_TITLE as TITLE, STATEMENTS, not_stated
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.part import budget_section as causes, method
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
@@ -25,7 +25,6 @@ from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_
 from cmm_uq.certificate.part.plots import Margin, correlation_section, margin_plots
 from cmm_uq.certificate.wording import OUTCOME_WORDS, TOO_UNCERTAIN, probability
 from cmm_uq.jobs.tables.conformity import needs_prior
-from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import nominal
 
@@ -134,12 +133,12 @@ def _not_covered(found: PartMeasurement) -> Text:
     ))  # fmt: skip
 
 
-TITLE = say("Measurement report")
 PLANNED = say("Measurement uncertainty")
 
 
 def part_document(found: PartMeasurement) -> doc.Document:
-    facts, measured, lacking = found.job.facts, found.measured is not None, lacking_of(found)
+    facts, measured = found.job.facts, found.measured is not None
+    lacking = [one for one in found.requirements if one.status == "missing"]
     sections = (
         results_section(found), conformity_section(found), part_section(found),
         errors_section(found), causes.budget_section(found), causes.priors_section(found),
@@ -158,19 +157,6 @@ def part_document(found: PartMeasurement) -> doc.Document:
         overview=overview_of(found), general=(STATEMENTS[0], say(
             "This report shall not be reproduced except in full without the written approval of the issuing laboratory.")),
     )  # fmt: skip
-
-
-def lacking_of(found: PartMeasurement) -> tuple[Requirement, ...]:
-    """What ISO/IEC 17025:2017, 7.8 asks of every report and the job does not state; nothing is asked where nobody measured."""
-    facts = found.job.facts
-    if found.measured is None or facts.job.origin != MEASURED:
-        return ()
-    item = asked("7.8.2.1 g", say("serial number of the part"), facts.part.serial, "[part] serial")
-    every = (
-        *of_every_report(facts.job, facts.laboratory, TITLE, item),
-        asked("7.8.4.1 b", say("conditions"), facts.job.conditions, "[job] conditions"),
-    )
-    return tuple(one for one in every if one.status == "missing")
 
 
 def _particulars(found: PartMeasurement) -> tuple[doc.Facts, ...]:

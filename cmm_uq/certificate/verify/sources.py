@@ -18,7 +18,7 @@ from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import PDF_BYTES, content_of
 from cmm_uq.certificate.sign.found import AFTER
-from cmm_uq.certificate.verify.given import JOB, RESULTS, Given, Inquiry, given_of
+from cmm_uq.certificate.verify.given import JOB, PART_SCHEMA, RESULTS, Given, Inquiry, given_of
 from cmm_uq.certificate.verify.texts import strict_json
 from cmm_uq.certificate.verify.views import AHEAD, Signed
 from cmm_uq.jobs.chain import dates_out_of_order
@@ -48,7 +48,8 @@ def witness_of(given: Given) -> Witness | None:
     else:
         return None
     head = ChainHead.of_results(data)
-    return None if head is None else Witness(name, head, sha256(content).hexdigest())
+    what = "report" if data.get("schema") == PART_SCHEMA else "certificate"
+    return None if head is None else Witness(name, head, sha256(content).hexdigest(), what)
 
 
 def witnesses_of(paths: Iterable[Path]) -> tuple[list[Witness], list[str]]:
@@ -84,7 +85,8 @@ def _files(root: Path) -> list[Path]:
 def check_records(inquiry: Inquiry, given: Given, records: Records, signed: Sequence[Signed]) -> None:
     """Keep where records are others than the certificate states, and say between which of their entries it was signed."""
     if (stated := witness_of(given)) is None:
-        inquiry.left("the records", "the certificate states no head of them: made without, or by an earlier version")
+        what = "report" if given.of_part else "certificate"
+        inquiry.left("the records", f"the {what} states no head of them: made without, or by an earlier version")
         return
     inquiry.looked("records")
     wrong = partial(inquiry.wrong, "records", records.shown)
@@ -100,7 +102,7 @@ def check_records(inquiry: Inquiry, given: Given, records: Records, signed: Sequ
     told = f"have entry {number}, which it states: nothing up to there was rewritten since."
     if number or own == 1:
         empty = "were empty when it was made."
-        inquiry.notes.append(f"The certificate is entry {own} of the records. They {told if number else empty}")
+        inquiry.notes.append(f"The {stated.what} is entry {own} of the records. They {told if number else empty}")
     else:
         why = f"it says that they were empty, and is their entry {own}: it may have been imported from others"
         inquiry.left("whether it was made with these records", why)

@@ -3,39 +3,26 @@
 A calibration that finds a machine beyond its limits, or an interim check out of control, puts in doubt what was measured since
 it was last found in order (ISO/IEC 17025:2017, 7.10): by the last calibration that does not find it so, or a check in
 control. Only a later calibration in order ends that. What nobody has released finds a machine out of order, and in order only
-where nothing of it is ever released. Parts are found by their reports, which name their machine and its certificate.
+where nothing of it is ever released. Parts are those of the records, and of reports beside them that these do not have.
 """
 
 from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.due.rule import check_standings
-from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedMachine, spelled
+from cmm_uq.laboratory.records.facts import MeasuredPart, RecordedCertificate, RecordedMachine, spelled
 
 _OPEN = ("undecided", "remeasure")  # decisions by which a machine is neither in order nor out of it
 SCHEMA = "cmm-uq/part/"
-
-
-@dataclass(frozen=True, slots=True)
-class MeasuredPart:
-    """A part's report: which part, when it was measured, by which certificate of the machine, and what came of it."""
-
-    day: dt.date
-    calibrated: dt.date
-    folder: str
-    number: str
-    part: str
-    serial: str
-    certificate: str
-    outcome: str
 
 
 @dataclass(frozen=True)
@@ -76,10 +63,13 @@ def doubtful_periods(certificates: Sequence[RecordedCertificate]) -> tuple[Doubt
     return tuple(found)
 
 
-def parts_measured(machine: RecordedMachine, reports: Iterable[Path]) -> Iterator[MeasuredPart]:
+def parts_measured(
+    machine: RecordedMachine, reports: Iterable[Path], known: Callable[[str], object | None] = lambda digest: None
+) -> Iterator[MeasuredPart]:
     """Of files ``results.json`` those of parts that were measured on a machine, by its serial number, else by its name.
 
-    A report of a part that cannot be read is refused.
+    ``known``: what records have of a file, by its SHA-256, which is then passed over; ``None`` for nothing. A report of a
+    part that cannot be read is refused.
     """
     name, maker = spelled(machine.name), spelled(f"({machine.manufacturer})")
     serial = "" if machine.by_name else spelled(machine.serial).removesuffix(maker)
@@ -89,13 +79,17 @@ def parts_measured(machine: RecordedMachine, reports: Iterable[Path]) -> Iterato
             data = json.loads(content)
             if not str(data["schema"]).startswith(SCHEMA) or data["job"]["origin"] != "measured":
                 continue
+            values = [one["value"] for one in data.get("characteristics") or ()]
+            if (values and not any(value is not None for value in values)) or known(
+                sha256(content).hexdigest()
+            ) is not None:
+                continue  # a part that was only planned, or is recorded
             job, part, by = data["job"], data["part"], data["machine"]
             own = spelled(str(by["serial"] or "")) if serial else ""
             if own == serial if own else spelled(str(by["machine"])) == name:
-                when, calibrated = (dt.date.fromisoformat(one["date"]) for one in (job, by))
                 number, outcome = job.get("number") or job["id"], data["decision"]["outcome"]
-                texts = [str(one or "") for one in (number, part["name"], part["serial"], by["number"], outcome)]
-                yield MeasuredPart(when, calibrated, str(file.parent), *texts)
+                yield MeasuredPart.of(part, by["date"], by["number"], day=job["date"], folder=str(file.parent), number=number,
+                                      outcome=outcome)  # fmt: skip
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             if b'"cmm-uq/part/' in content:
                 raise CmmUqError(
@@ -104,9 +98,8 @@ def parts_measured(machine: RecordedMachine, reports: Iterable[Path]) -> Iterato
 
 
 def with_parts(
-    periods: Sequence[DoubtfulPeriod], machine: RecordedMachine, reports: Iterable[Path], on: dt.date
+    periods: Sequence[DoubtfulPeriod], parts: Iterable[MeasuredPart], on: dt.date
 ) -> tuple[DoubtfulPeriod, ...]:
     """Periods with the parts that were measured in them up to a day, by day."""
-    every = sorted(parts_measured(machine, reports), key=lambda one: (one.day, one.number)) if periods else []
-    known = [one for one in every if one.day <= on]
+    known = sorted((one for one in parts if one.day <= on), key=lambda one: (one.day, one.number))
     return tuple(replace(one, parts=tuple(part for part in known if one.holds(part))) for one in periods)

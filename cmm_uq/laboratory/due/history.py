@@ -23,7 +23,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.laboratory.due.doubt import DoubtfulPeriod, doubtful_periods
 from cmm_uq.laboratory.due.rule import ComparedValue, ValueChange, change, common_part, is_of_machine
-from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine, Series
+from cmm_uq.laboratory.records.facts import STANDING, MeasuredPart, RecordedCertificate, RecordedMachine, Series
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.due.crossing import Crossing
@@ -138,6 +138,7 @@ class MachineHistory:
     values: tuple[ValueHistory, ...]  # in the order of the newest certificate
     remarks: tuple[Text, ...]  # what is to be known, a sentence each
     doubtful: tuple[DoubtfulPeriod, ...] = ()  # when what was measured on it is in doubt
+    parts: tuple[MeasuredPart, ...] = ()  # whose reports the records have, by day
 
     @property
     def decision(self) -> str:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 ADDED = {
     "0002": ("ALTER TABLE certificates ADD COLUMN artefact_due VARCHAR(10)", "ALTER TABLE machines ADD COLUMN calibrate TEXT"),
     "0003": (),  # what a job leaves unsaid stays as it was
+    "0004": (),  # reports of parts are among the certificates
 }  # fmt: skip
 """What a revision adds to the tables that follow from the entries; what stands in them is then made again from these."""
 

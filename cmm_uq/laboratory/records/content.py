@@ -13,8 +13,9 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.job import JobFile
+from cmm_uq.jobs.part.tables import PartFile
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.laboratory.records.facts import KEY, PERFORMANCE, ChainHead
+from cmm_uq.laboratory.records.facts import KEY, PART, PERFORMANCE, ChainHead
 
 Named = Callable[[str], str]  # how a value is called in the field, by its name: ``scale_x.ppm``
 
@@ -30,7 +31,7 @@ FIGURE, ARTEFACT = "accuracy.", "artefact."
 
 def certificate_content(
     data: Mapping[str, Any],
-    facts: JobFile | None,
+    facts: JobFile | PartFile | None,
     *,
     command: str,
     folder: str,
@@ -38,15 +39,16 @@ def certificate_content(
     files: Mapping[str, str],
     named: Named,
 ) -> dict[str, Any]:
-    """Content of the entry of a report or a diagnosis; ``facts`` is ``None`` where only results.json is left."""
+    """Content of the entry of a report, of a part too, or a diagnosis; ``facts``: ``None`` where only results.json is left."""
     try:
         job, verdicts = data["job"], Verdicts.of_results(data)
+        stated = _of_part(data) if command == PART else _of_results(job)
         # keys of what ISO/IEC 17025:2017, 7.8 asks for and the certificate does not state
         head = ChainHead.of_results(data)
         missing = [str(one["key"]) for one in data.get("iso17025") or () if one["status"] == "missing"]
         return {
             "command": command, "job": str(job["id"]), "origin": str(job["origin"]), "day": str(job["date"]),
-            **(_of_job(facts) if facts else _of_results(job)),
+            **stated, **(_of_job(facts) if facts else {}),
             "decision": verdicts.overall, **({"verdicts": verdicts.data()} if verdicts else {}),
             "diagnosis": str((data.get("diagnosis") or {}).get("verdict") or ""),
             "version": str((data.get("software") or {}).get("version") or ""), "folder": folder,
@@ -59,8 +61,8 @@ def certificate_content(
 
 
 def kind_of_entry(content: Mapping[str, Any]) -> str:
-    """Whether a content is of an interim check or of a report."""
-    return "check" if content.get("interim") else "report"
+    """Whether a content is of an interim check, of a part's report or of another."""
+    return PART if content["command"] == PART else "check" if content.get("interim") else "report"
 
 
 def values(data: Mapping[str, Any], named: Named) -> list[list[Any]]:
@@ -81,8 +83,8 @@ def covariance(data: Mapping[str, Any]) -> dict[str, Any] | None:
     given = data.get("covariance") or {}
     matrix = given.get("matrix") or ()
     lower = [matrix[i][j] for i in range(len(matrix)) for j in range(i + 1)]
-    if not lower or not all(_finite(element) for element in lower):
-        return None
+    if "parameters" not in given or not lower or not all(_finite(element) for element in lower):
+        return None  # characteristics of a part are no values of its machine
     return {"names": list(given["parameters"]), "lower": lower}
 
 
@@ -91,10 +93,14 @@ def unit_of(name: str) -> str:
     return next((unit for end, unit in _UNIT_OF if name.endswith(end) and unit in UNITS), "1")
 
 
-def _of_job(facts: JobFile) -> dict[str, Any]:
-    job, machine, artefact, laboratory = facts.job, facts.machine, facts.artefact, facts.laboratory
+def _of_job(facts: JobFile | PartFile) -> dict[str, Any]:
+    laboratory = facts.laboratory
+    persons = {"operator": facts.job.operator or laboratory.signatory, "four_eyes": laboratory.four_eyes}
+    if isinstance(facts, PartFile):
+        return persons | {"points": facts.recording.recorded if facts.recording else ""}
+    job, machine, artefact = facts.job, facts.machine, facts.artefact
     chain = artefact.certificate
-    return {
+    return persons | {
         "number": job.number or job.id,
         "machine": {
             "serial": machine.serial, "name": machine.name, "manufacturer": machine.manufacturer, "model": machine.model,
@@ -107,7 +113,6 @@ def _of_job(facts: JobFile) -> dict[str, Any]:
             "due": _iso(chain.until if chain else None),
         },
         "kind": artefact.kind, "adjusted_since": _iso(job.adjusted_since), "interim": job.interim,
-        "operator": job.operator or laboratory.signatory, "four_eyes": laboratory.four_eyes,
     }  # fmt: skip
 
 
@@ -117,6 +122,20 @@ def _of_results(job: Mapping[str, Any]) -> dict[str, Any]:
         "number": str(job["id"]), "machine": {**machine, "manufacturer": "", "model": "", "place": ""},
         "artefact": {}, "kind": "", "adjusted_since": None, "interim": bool(job.get("interim")), "operator": "",
         "four_eyes": False,
+    }  # fmt: skip
+
+
+def _of_part(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Of the report of a part: which part, by which plan, machine and certificate of it; hashes are with the inputs."""
+    job, part, by = data["job"], data["part"], data["machine"]
+    return _of_results({**job, "machine": by["machine"], "serial": by["serial"]}) | {
+        "number": str(job.get("number") or job["id"]),
+        "part": {name: str(part[name] or "") for name in ("name", "serial", "drawing")},
+        "plan": "job.toml", "measured": any(one["value"] is not None for one in data["characteristics"]),
+        "certificate": {
+            "number": str(by["number"] or ""), "laboratory": str(by["laboratory"] or ""), "calibrated": str(by["date"]),
+            "due": by["valid_until"] and str(by["valid_until"]), "files": list(map(str, by["files"])),
+        },
     }  # fmt: skip
 
 

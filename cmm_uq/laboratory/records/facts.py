@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 KINDS = (
-    "machine", "artefact", "report", "release", "withdrawal", "replacement", "adjustment", "check", "imported",
+    "machine", "artefact", "report", "part", "release", "withdrawal", "replacement", "adjustment", "check", "imported",
     "retained", "sent", "signed",
 )  # fmt: skip
 """What an entry may be of."""
 
-CERTIFIED = frozenset({"report", "check", "imported"})
-"""Kinds whose content is that of a certificate or of an interim check."""
+CERTIFIED = frozenset({"report", "part", "check", "imported"})
+"""Kinds whose content is that of a certificate, of a part's report or of an interim check."""
 
 BEGINNING = "0" * 64  # what the first entry carries in place of a hash before it
 
@@ -160,11 +160,12 @@ class ChainHead:
 
 @dataclass(frozen=True)
 class Witness:
-    """A certificate in other hands, with the head that it states, and the SHA-256 of its results.json, as records know it."""
+    """A document in other hands, with the head that it states, and the SHA-256 of its results.json, as records know it."""
 
     name: str  # of its file
     head: ChainHead
     results_sha256: str
+    what: str = "certificate"  # or a report of a part
 
 
 @dataclass(frozen=True)
@@ -257,6 +258,32 @@ class RecordedCertificate:
 
 
 @dataclass(frozen=True, slots=True)
+class MeasuredPart:
+    """A part's report: which part, when it was measured, by which certificate of the machine, and what came of it."""
+
+    day: dt.date
+    calibrated: dt.date
+    folder: str
+    number: str
+    part: str
+    serial: str
+    certificate: str
+    outcome: str
+    entry: int = 0  # of the records that have it; 0 where none does
+
+    @classmethod
+    def of(
+        cls, part: Mapping[str, Any], calibrated: str, certificate: object, *, day: str, folder: str, number: object,
+        outcome: object, entry: int = 0,
+    ) -> MeasuredPart:  # fmt: skip
+        """As files and entries state it, with ``None`` for what they leave open."""
+        return cls(
+            dt.date.fromisoformat(day), dt.date.fromisoformat(calibrated), folder, str(number), str(part["name"] or ""),
+            str(part["serial"] or ""), str(certificate or ""), str(outcome or ""), entry,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
 class ReleaseSignature:
     entry: int
     certificate: int
@@ -308,6 +335,8 @@ class ChainFinding:
 
 
 BY_NAME = "name:"  # what begins the key of something without a serial number
+BY_PART = "part:"  # of a machine that only reports of parts name: none of the records until anything else does
+PART = "part"  # command that makes these
 
 
 def spelled(serial: str) -> str:

@@ -36,6 +36,7 @@ class Indexer:
         self.connection = connection
         self._rows: dict[Table, list[Row]] = {table: [] for table in INDEX}
         self._recognised: dict[Table, dict[str, Row]] = {machines: {}, artefacts: {}}
+        self._same: dict[str, list[Row]] = {}  # machines of one serial number, until another becomes known
         self._quantities: dict[tuple[str, str, str], int] = {}
         self._certificates: dict[int, Row] = {}
         self._counts: dict[Table, int] = {}
@@ -87,12 +88,14 @@ class Indexer:
 
     def _certificate(self, entry: Entry, data: Mapping[str, Any]) -> None:
         day, used, since = str(data["day"]), data.get("artefact") or {}, data.get("adjusted_since")
-        machine = self._machine(data["machine"], day, entry.number)
+        command = data.get("command", "report")
+        of_part = command == facts.PART
+        machine = self._machine(data["machine"], "" if of_part else day, entry.number, of_part=of_part)
         artefact = self._artefact(used, str(data["kind"]), day, entry.number)
         if since:
             self._adjustment(machine, since, entry.number)
         row = {
-            "entry": entry.number, "machine": machine, "artefact": artefact, "command": data.get("command", "report"),
+            "entry": entry.number, "machine": machine, "artefact": artefact, "command": command,
             "job": data["job"], "number": data.get("number") or data["job"], "kind": data["kind"],
             "origin": data["origin"], "day": day, "at": entry.at, "adjusted_since": since or None, "state": "draft",
             "decision": data.get("decision") or "none", "diagnosis": data.get("diagnosis") or "",
@@ -113,7 +116,8 @@ class Indexer:
             row = {"certificate": entry.number, "names": names_of, "lower": json.dumps(together["lower"])}
             self._rows[tables.covariances].append(row)
 
-    def _machine(self, said: Mapping[str, Any], day: str, entry: int) -> int:
+    def _machine(self, said: Mapping[str, Any], day: str, entry: int, *, of_part: bool = False) -> int:
+        """Of a part's report, which knows no manufacturer, the one machine that is called so."""
         names = ("name", "manufacturer", "model", "place")
         row: Row = {name: text for name in names if (text := called(said, name))}  # what is not said changes nothing
         if "name" in row:
@@ -122,10 +126,28 @@ class Indexer:
             row["calibrate"] = json.dumps(said["calibrate"], sort_keys=True)
 
         def first() -> Row:
-            known = {"called": self._name_of(said), "spelled": spelled(called(said, "serial", "name"))}
+            known = {"called": self._name_of(said), "spelled": own}
             return {**dict.fromkeys(("named", *names), ""), "calibrate": None, **known}
 
-        return self._thing(machines, facts.machine_key(said), row, first, day, entry)
+        own, key = spelled(called(said, "serial", "name")), facts.machine_key(said)
+        known = self._known(machines, key)
+        alike = known or self._alike(own, row.get("named", ""), of_part=of_part)
+        if alike is not None and of_part:
+            return int(alike["id"])
+        if alike is not None and known is None:
+            self._change(machines, alike, {"recognised": key})  # it is of the records from now on
+        return self._thing(machines, f"{facts.BY_PART}{key}" if of_part else key, row, first, day, entry)
+
+    def _alike(self, own: str, named: str, *, of_part: bool) -> Row | None:
+        """The one machine of that serial number, of several that of the name; without ``of_part`` of those of parts alone."""
+        if (found := self._same.get(own)) is None:
+            query = select(machines).where(machines.c.spelled == own)
+            stored = {row["id"]: dict(row) for row in self.connection.execute(query).mappings()}
+            cached = (row for row in self._recognised[machines].values() if row["spelled"] == own)
+            found = self._same[own] = list({**stored, **{row["id"]: row for row in cached}}.values())
+        rows = [row for row in found if of_part or row["recognised"].startswith(facts.BY_PART)]
+        rows = [row for row in rows if row["named"] == named] if len(found) > 1 else rows
+        return rows[0] if len(rows) == 1 else None
 
     def _name_of(self, said: Mapping[str, Any]) -> str:
         """As it is asked for: its serial, and where another has the same, what tells them apart behind it."""
@@ -141,7 +163,7 @@ class Indexer:
     def _artefact(self, said: Mapping[str, Any], kind: str, day: str, entry: int) -> int | None:
         if not (key := facts.artefact_key(said)):
             return None
-        known = self._recognised[artefacts].get(key) or self._stored(artefacts, artefacts.c.recognised == key) or {}
+        known = self._known(artefacts, key) or {}
         own: Row = {name: called(said, name) for name in ("certificate", "laboratory")}
         own |= {name: said.get(name) or None for name in ("calibrated", "due")}
         after = facts.certificate_after(known, own)
@@ -158,21 +180,29 @@ class Indexer:
 
         What is older says of rule and certificate what nobody said since.
         """
-        cache, waiting = self._recognised[table], self._rows[table]
-        row = cache.get(key) or self._stored(table, table.c.recognised == key)
+        row = self._known(table, key)
         if row is None:
             row = {"id": self._next(table), "recognised": key, **first(), **said, "day": day, "entry": entry}
-            waiting.append(row)
+            self._rows[table].append(row)
+            self._same.clear()
         elif changed := {
             name: value for name, value in said.items()
             if value != row[name] and (day >= row["day"] or (not row[name] and name in _FILLED))
         }:  # fmt: skip
-            changed |= {"day": day, "entry": entry} if day >= row["day"] else {}
-            row.update(changed)
-            if not waiting or row["id"] < waiting[0]["id"]:  # it is written already: rows are numbered as they come
-                self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))
-        cache[key] = row
+            self._change(table, row, changed | ({"day": day, "entry": entry} if day >= row["day"] else {}))
+        self._recognised[table][key] = row
         return int(row["id"])
+
+    def _known(self, table: Table, key: str) -> Row | None:
+        return self._recognised[table].get(key) or self._stored(table, table.c.recognised == key)
+
+    def _change(self, table: Table, row: Row, changed: Row) -> None:
+        row.update(changed)
+        self._same.clear()
+        self._recognised[table][row["recognised"]] = row
+        waiting = self._rows[table]
+        if not waiting or row["id"] < waiting[0]["id"]:  # it is written already: rows are numbered as they come
+            self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))
 
     def _adjustment(self, machine: int, day: str, entry: int) -> None:
         c = tables.adjustments.c

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from sqlalchemy import ColumnElement, Connection, func, or_, select
 
 from cmm_uq.jobs.verdicts import Verdicts, gravest
 from cmm_uq.laboratory.records.facts import BY_NAME, PERFORMANCE, STANDING, Entry, RecordedMachine, spelled
-from cmm_uq.laboratory.records.queries import adjusted_before, blocks, newest_of_machine
+from cmm_uq.laboratory.records.queries import RECORDED, adjusted_before, blocks, newest_of_machine
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
 
@@ -80,7 +80,7 @@ def standing_of_all(records: Records) -> list[Newest]:
         select(m.called, m.name.label("of_name"), m.manufacturer, m.model, m.place, m.recognised, *_COLUMNS)
         .select_from(machines.outerjoin(certificates, _C.entry == newest_of_machine())
                      .outerjoin(artefacts, artefacts.c.id == _C.artefact))
-        .order_by(m.id)
+        .where(RECORDED).order_by(m.id)
     )  # fmt: skip
     with records.reading() as connection:
         rows = connection.execute(query).all()
@@ -195,17 +195,22 @@ def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[st
     Values have the names that the records give them; where several statements are of one, the gravest counts.
     """
     found: dict[int, dict[str, str]] = {}
+    for number, content in contents(records, numbers):
+        outcomes = found[number] = {}
+        for one in Verdicts.of_results(content):
+            name = PERFORMANCE + (one.name or one.by) if one.by else one.name
+            if one.by and name in outcomes:
+                name = f"{name} ({one.by})"
+            outcomes[name] = gravest((one.outcome, outcomes.get(name, one.outcome)))
+    return found
+
+
+def contents(records: Records, numbers: Collection[int]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """What entries say, by their numbers."""
     with records.reading() as connection:
         for block in blocks(sorted(numbers)):
             query = select(entries.c.number, entries.c.content).where(entries.c.number.in_(block))
-            for number, content in connection.execute(query):
-                outcomes = found[int(number)] = {}
-                for one in Verdicts.of_results(json.loads(content)):
-                    name = PERFORMANCE + (one.name or one.by) if one.by else one.name
-                    if one.by and name in outcomes:
-                        name = f"{name} ({one.by})"
-                    outcomes[name] = gravest((one.outcome, outcomes.get(name, one.outcome)))
-    return found
+            yield from ((int(number), json.loads(content)) for number, content in connection.execute(query))
 
 
 def entry_of(records: Records, number: int) -> Entry | None:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 15.0  # how long to wait for another process that writes
 _TURNS = 150
-REVISION = "0003"  # newest revision of the tables; see :func:`cmm_uq.laboratory.records.backup.migrate`
-KNOWN = ("0001", "0002", "0003")  # all revisions, oldest first
+REVISION = "0004"  # newest revision of the tables; see :func:`cmm_uq.laboratory.records.backup.migrate`
+KNOWN = ("0001", "0002", "0003", "0004")  # all revisions, oldest first
 
 
 def open_records(where: str | Path | None = None, *, create: bool = False, read_only: bool = False) -> Records:

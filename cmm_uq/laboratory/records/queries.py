@@ -31,9 +31,13 @@ _CERTIFICATES = select(
 ).select_from(certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.artefact))
 
 
-def _measured(c: Any, origin: str = "measured") -> tuple[ColumnElement[bool], ...]:
+RECORDED = ~machines.c.recognised.startswith(facts.BY_PART)
+"""Machines of the records: what only reports of parts name is none until a certificate or an entry does."""
+
+
+def _measured(c: Any, origin: str = "measured", command: str = "report") -> tuple[ColumnElement[bool], ...]:
     """Reports of an origin that stand."""
-    return c.command == "report", c.origin == origin, c.state.in_(facts.STANDING)
+    return c.command == command, c.origin == origin, c.state.in_(facts.STANDING)
 
 
 class RecordQueries:
@@ -47,6 +51,11 @@ class RecordQueries:
         """Folder of the file: folders of reports inside it are recorded relative to it; ``None`` for a server."""
         return self.place.absolute().parent if isinstance(self.place, Path) else None
 
+    @property
+    def _before(self) -> str:
+        """What stands before a recorded folder that is relative."""
+        return "" if self.home is None else f"{self.home}{os.sep}"
+
     @contextlib.contextmanager
     def reading(self) -> Iterator[Connection]:
         """A connection; what the database refuses is said in words."""
@@ -56,7 +65,7 @@ class RecordQueries:
     def machines(self, on: dt.date | None = None) -> list[facts.RecordedMachine]:
         """All machines, by serial, with the rules that are stated up to a day."""
         with self.reading() as connection:
-            rows = _known_on(connection, machines, _RULE, on)
+            rows = _known_on(connection, machines, _RULE, on, RECORDED)
             days = _adjusted(connection, [row["id"] for row in rows])
             return [_machine(row, days[row["id"]]) for row in rows]
 
@@ -144,6 +153,22 @@ class RecordQueries:
         with self.reading() as connection:
             return {row[0]: dt.date.fromisoformat(row[1]) for row in connection.execute(query)}
 
+    def parts(self, machine: str) -> list[facts.MeasuredPart]:
+        """Standing reports of parts that were measured on a machine, by day, then entry."""
+        e = tables.entries.c
+        query = select(e.content, e.number, _C.day, _C.folder, _C.number.label("called"), _C.decision)
+        query = query.join(certificates, e.number == _C.entry).order_by(_C.day, _C.entry)
+        with self.reading() as connection:
+            ours = query.where(_C.machine == _machine_id(connection, machine), *_measured(_C, command=facts.PART))
+            each = ((json.loads(row.content), row) for row in connection.execute(ours))
+            return [
+                facts.MeasuredPart.of(
+                    said["part"], said["certificate"]["calibrated"], said["certificate"]["number"], day=row.day,
+                    folder=_opened(self._before, row.folder), number=row.called, outcome=row.decision, entry=row.number,
+                )
+                for said, row in each if said["measured"]
+            ]  # fmt: skip
+
     def signatures(self, certificate: int) -> list[facts.ReleaseSignature]:
         """Who released, withdrew or replaced a certificate, in order."""
         table = tables.signatures
@@ -206,7 +231,7 @@ class RecordQueries:
         stated = _values(connection, entries) if values else {}
         together = _covariances(connection, entries) if values else {}
         adjusted = _adjusted(connection, {row.machine for row in rows})
-        before = "" if self.home is None else f"{self.home}{os.sep}"
+        before = self._before
         day_of, moment_of = dt.date.fromisoformat, dt.datetime.fromisoformat
         return [
             facts.RecordedCertificate(
@@ -285,13 +310,15 @@ def _machine(row: Mapping[Any, Any], adjusted: Iterable[str]) -> facts.RecordedM
 def _machine_id(connection: Connection, serial: str) -> int:
     m, key = machines.c, facts.spelled(serial)
     for way in (m.called == serial, m.spelled == key, m.named == key):
-        rows = connection.execute(select(m.id, m.called).where(way)).all()
+        rows = connection.execute(select(m.id, m.called).where(way, RECORDED)).all()
         if len(rows) == 1:
             return int(rows[0].id)
         if rows:
             names = " or ".join(repr(row.called) for row in rows[:5])
             raise CmmUqError(f"{len(rows)} machines are called {serial!r}", where="records", fix=f"Say {names}")
-    near = {name for row in connection.execute(select(m.called, m.name).limit(2000)) for name in row if name}
+    near = {
+        name for row in connection.execute(select(m.called, m.name).where(RECORDED).limit(2000)) for name in row if name
+    }
     fix = suggestion(serial, near) if near else "No machine is recorded yet"
     raise CmmUqError(f"no machine {serial!r} is recorded", where="records", fix=fix)
 

@@ -226,15 +226,15 @@ def _disagreement(connection: Connection, witness: Witness) -> ChainFinding | No
     elif number and (row is None or row.hash != head.head):
         there = "is missing" if row is None else f"has the hash {row.hash}"
         of_own = connection.execute(select(entries.c.kind).where(entries.c.number == own)).scalar()
-        known = "" if own is None else f", though they have the certificate as entry {own}"
+        known = "" if own is None else f", though they have the {witness.what} as entry {own}"
         if of_own == "imported":
-            known = f", or the certificate, their entry {own}, was imported from others"
+            known = f", or the {witness.what}, their entry {own}, was imported from others"
         problem = f"that entry {there}: they were rewritten{known or ', or they are others'}"
     elif row is not None and row.at != head.at:
-        problem = f"that entry is of {row.at}, and the certificate says {head.at}"
+        problem = f"that entry is of {row.at}, and the {witness.what} says {head.at}"
     elif own is None:
         lost = "what came later was rewritten or lost, as by restoring an older backup, or they are others"
-        problem = f"they do not have the certificate itself: {lost}"
+        problem = f"they do not have the {witness.what} itself: {lost}"
     else:
         return None
     stated = f"entry {number} with the hash {head.head}" if number else "entry 0, empty records"

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
+import os
 import tomllib
+from hashlib import sha256
 from pathlib import Path
 from subprocess import CompletedProcess
+from unittest import mock
 
 import numpy as np
 import pytest
 
+from cmm_uq.app.commands.files import results_at
+from cmm_uq.app.commands.laboratory.records import import_reports
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.verify.sources import witnesses_of
 from cmm_uq.jobs.part.job import TABLES
+from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.records.facts import BEGINNING
 from tests.app.cli.process import run
 from tests.part_machines import THERE, by_results, plate_files
 
@@ -31,13 +40,51 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, CompletedProce
     """A diameter that is not within its limits."""
     place = tmp_path_factory.mktemp("part")
     folder = folder_of(place, characteristic=[TIGHT])
-    return place, run("part", folder, *TRIALS, "--strict", "--seed", 3, cwd=place)
+    with mock.patch.dict(os.environ, {"CMM_UQ_RECORDS": ""}):
+        return place, run("part", folder, *TRIALS, "--strict", "--seed", 3, cwd=place)
 
 
 def test_it_writes_its_files_below_reports(done: tuple[Path, CompletedProcess[str]]) -> None:
     place, _ = done
     written = sorted(path.name for path in (place / "reports" / "plate").iterdir())
     assert written == ["manifest.json", "part-simulated.html", "part-simulated.pdf", "provenance.json", "results.json"]
+
+
+def test_it_is_recorded_and_states_the_head_before_its_entry(done: tuple[Path, CompletedProcess[str]]) -> None:
+    """Whoever has the report shows the entry; imported into other records it is the same one."""
+    place, process = done
+    assert "Recorded in reports/records.db." in process.stdout
+    report, empty = place / "reports" / "plate", {"entries": 0, "head": BEGINNING, "at": None}
+    results = (report / "results.json").read_bytes()
+    assert json.loads(results)["records"] == empty
+    page = (report / "part-simulated.html").read_text(encoding="utf-8")
+    assert "Records of the laboratory before this document: empty, entry 0." in page
+    with open_records(place / "reports" / "records.db", read_only=True) as records:
+        (entry,) = records.entries()
+        stated, _ = witnesses_of([report])
+        assert (entry.kind, records.disagreements(stated), records.verify()) == ("part", [], [])
+        again, _ = results_at(json.loads(results), records.heads("part", "plate"))
+        assert again == results  # made again at a later head
+    said, digest = entry.data, sha256((report / "part-simulated.pdf").read_bytes()).hexdigest()
+    assert (said["number"], said["decision"], said["records"], said["files"]["part-simulated.pdf"]) == (
+        "plate", "fail", empty, digest
+    )  # fmt: skip
+    assert (said["plan"], said["points"], said["certificate"]["files"][0]) == (
+        "job.toml",
+        "points.csv",
+        "machine/results.json",
+    )
+    assert {"job.toml", "points.csv", "machine/results.json"} <= said["inputs"].keys()
+    with open_records(place / "others.db", create=True) as others:
+        import_reports(others, [report])
+        (imported,) = others.entries()
+    assert imported.data == said | {"folder": "reports/plate"}
+    (report / "results.json").write_bytes(results.replace(b'"entries": 0', b'"entries": 1'))
+    try:
+        with pytest.raises(CmmUqError, match="is no head of records"):
+            witnesses_of([report / "results.json"])
+    finally:
+        (report / "results.json").write_bytes(results)
 
 
 def test_a_part_that_does_not_conform_ends_with_4_where_that_is_asked_for(

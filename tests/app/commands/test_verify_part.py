@@ -23,6 +23,7 @@ from cmm_uq.app.commands.parts.machine import state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, contents_of, evaluate_part, write_part, written
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement, standing_data
+from cmm_uq.laboratory.records import open_records
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
 from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, put, unchanged, with_inputs
@@ -58,6 +59,28 @@ def test_a_report_is_verified_from_its_pdf_alone_and_computed_again_to_the_byte(
     assert found.inquiry.word == "VERIFIED", told(found)
     assert found.inquiry.done["again"] > 400
     assert {name for name, count in found.inquiry.done.items() if count} >= {"figures", "decisions", "inputs", "dates"}
+
+
+@pytest.mark.usefixtures("once")
+def test_a_recorded_report_is_the_same_again_at_its_head(tmp_path: Path) -> None:
+    place = tmp_path / "records.db"
+    with open_records(place, create=True) as records:
+        first = records.append("artefact", {"serial": "BB-7"})
+    written(plate_found().job, plate_found, tmp_path / "out", records=place)
+    found = verify([tmp_path / "out"], records=place)
+    assert found.inquiry.word == "VERIFIED", told(found)
+    assert "The report is entry 2 of the records. They have entry 1, which it states: nothing up to there" in "\n".join(
+        found.inquiry.notes
+    )
+    assert first.hash in (tmp_path / "out" / PAGE).read_text(encoding="utf-8")
+    with open_records(tmp_path / "rewritten.db", create=True) as others:
+        others.append("artefact", {"serial": "BB-8"})
+    other = verify([tmp_path / "out"], rerun=False, records=tmp_path / "rewritten.db")
+    assert "was made after entry 1 with the hash" in told(other)
+    (tmp_path / "none").mkdir()
+    put(tmp_path / "none", plate_report())
+    none = verify([tmp_path / "none"], rerun=False, records=place)
+    assert "the records: the report states no head of them" in told(none)
 
 
 def test_its_folder_is_held_to_its_manifest_with_the_folders_inside(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from cmm_uq.certificate.part.budget_section import by_family, unseen_section, wa
 from cmm_uq.certificate.part.figures import _remarks
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement, UnseenError
 from cmm_uq.certificate.part.method import machine_section, method_section
-from cmm_uq.certificate.part.page import errors_section, lacking_of, overview_of, part_document, results_section
+from cmm_uq.certificate.part.page import errors_section, overview_of, part_document, results_section
 from cmm_uq.certificate.render import render_html, render_pdf
 from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.job import TABLES
@@ -393,10 +393,11 @@ def test_a_complete_report_is_no_draft_and_what_another_lacks_is_named(measured:
     assert [one.name for one in whole.signatures] == ["A. Person"]
     assert whole.date == dt.date(2026, 6, 1)
     job = plate(job={"id": "plate", "date": dt.date(2026, 5, 31), "customer": "C"})
-    missing = lacking_of(replace(measured, job=replace(job, measured=measured.job.measured)))
+    every = replace(measured, job=replace(job, measured=measured.job.measured)).requirements
+    missing = [one for one in every if one.status == "missing"]
     assert {"[part] serial", "[laboratory] name", "[job] conditions"} <= {one.key for one in missing}
     assert "[job] customer" not in {one.key for one in missing}
-    assert lacking_of(measured) == ()
+    assert not [one for one in measured.requirements if one.status == "missing"]
 
 
 def test_what_is_not_measured_and_not_stated_is_said(measured: PartMeasurement) -> None:

@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.pages.doubt import doubt_data, doubt_words
 from cmm_uq.certificate.pages.history import history_document, overview_of
 from cmm_uq.certificate.render import render_html
-from cmm_uq.laboratory.due.doubt import DoubtfulPeriod, doubtful_periods, with_parts
+from cmm_uq.laboratory.due.doubt import DoubtfulPeriod, doubtful_periods, parts_measured, with_parts
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import RecordedCertificate
 from tests.laboratory.due.histories import MACHINE, certificate, value
@@ -83,14 +83,14 @@ def test_parts_in_doubt_are_those_measured_since_by_no_newer_certificate(tmp_pat
     )
     until = dt.date(2024, 8, 1)
     periods = [DoubtfulPeriod(dt.date(2024, 3, 1), check(5, 9.0), until)]
-    (found,) = with_parts(periods, MACHINE, files, dt.date(2024, 8, 15))
+    (found,) = with_parts(periods, parts_measured(MACHINE, files), dt.date(2024, 8, 15))
     assert [one.day.isoformat() for one in found.parts] == ["2024-03-01", "2024-04-29", "2024-04-30", "2024-06-02"]
-    (none,) = with_parts([replace(periods[0], after=dt.date(2024, 8, 1))], MACHINE, files, until)
+    (none,) = with_parts([replace(periods[0], after=dt.date(2024, 8, 1))], parts_measured(MACHINE, files), until)
     assert none.parts == ()
     damaged = tmp_path / "results.json"
     damaged.write_text('{"schema": "cmm-uq/part/1", "job": 1}', encoding="utf-8")
     with pytest.raises(CmmUqError, match=r"is no results\.json of a part"):
-        with_parts(periods, MACHINE, [damaged], until)
+        with_parts(periods, parts_measured(MACHINE, [damaged]), until)
 
 
 def test_history_names_the_parts_between_a_good_and_a_failed_check(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ from cmm_uq.jobs.importing.recording import header, is_own
 from cmm_uq.jobs.job import Job, Recorded
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records import content as contents
-from cmm_uq.laboratory.records.facts import STANDING, ChainHead, Heads, RecordedCertificate, RecordedValue
+from cmm_uq.laboratory.records.facts import PART, STANDING, ChainHead, Heads, RecordedCertificate, RecordedValue
 from cmm_uq.laboratory.records.place import NONE
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 
 CORRECTIONS, JOB = "corrections.toml", "job.toml"
 SAME = 1e-9  # relative difference within which figures are the same: results.json has ten digits
+_PART = "a report of a part is computed again by cmm-uq verify, and anew by cmm-uq part"
 Figures = tuple[float, float, float, float]  # recordedValue, u, lower and upper end of the interval
 
 
@@ -212,7 +213,9 @@ def affected_certificates(
             one for one in between(certificate.version, last)
             if one.concerns(certificate.command, certificate.kind, inputs)
         )  # fmt: skip
-        if touching and recompute and files:
+        if touching and certificate.command == PART:
+            yield AffectedCertificate(certificate, touching, problem=problem or _PART)
+        elif touching and recompute and files:
             one_of_many = jobs[certificate.command, certificate.job] > 1
             name = f"{certificate.job}-{certificate.entry}" if one_of_many else certificate.job
             yield _again(certificate, touching, files, out and out / name, where)

@@ -28,7 +28,7 @@ from cmm_uq.jobs.source import RESULTS
 from cmm_uq.jobs.tables.identification import MEASURED, REPLACED as FILE, denies_a_change
 from cmm_uq.jobs.verdicts import NONE, Verdicts
 from cmm_uq.laboratory.records.content import values
-from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, spelled
+from cmm_uq.laboratory.records.facts import PART, STANDING, RecordedCertificate, spelled
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 
 if TYPE_CHECKING:
@@ -268,7 +268,7 @@ class Release:
 
 def certificate_named(records: Records, name: str, states: Collection[str]) -> RecordedCertificate:
     """The certificate of a number, entry, job, folder or hash of results.json; where none is in these states, the newest."""
-    found = [one for one in records.named(name) if one.command == "report"]
+    found = [one for one in records.named(name) if one.command in ("report", PART)]
     if not found:
         known = records.certificates(origin=None, values=False, limit=_NEWEST)
         near = suggestion(name, {word for one in known for word in (one.number, one.job) if word}) if known else ""
@@ -329,8 +329,10 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
     other = certificate_named(records, replaced_by, ("released",))
     if other.entry == certificate.entry:
         raise CmmUqError("a certificate does not replace itself", where="--replaced-by", fix="Name the new one's entry")
-    if other.state != "released" or other.machine != certificate.machine:
+    alike = other.command == certificate.command and (other.machine == certificate.machine or other.command == PART)
+    if other.state != "released" or not alike:  # a part may be measured again on another machine
         why = f"is {other.state}" if other.state != "released" else f"is of {other.machine}, not {certificate.machine}"
+        why = "is no report of a part" if alike is False and certificate.command == PART else why
         fix = "Name a released certificate of this machine"
         raise CmmUqError(f"{other.number} {why}", where="--replaced-by", fix=fix)
     refuse_denial(records, certificate, other, reason)

@@ -34,6 +34,7 @@ from cmm_uq.certificate.verify.given import (
 )
 from cmm_uq.jobs.part.job import PartJob, part_of
 from cmm_uq.jobs.source import sha256
+from cmm_uq.laboratory.records.facts import ChainHead, Heads
 
 TRUSTED = "whose signature the machine's certificate has"
 
@@ -146,7 +147,8 @@ def part_again(
         tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
     found, kept = evaluate_part(job, options, stage), list[str]()
-    files = contents_of(found, stage, finished=partial(as_attached, given, kept))
+    finished, heads = partial(as_attached, given, kept), Heads(ChainHead.of_results(data))
+    files = contents_of(found, stage, finished=finished, heads=heads)
     return recomputed(given, files, kept, tuple(found.files))
 
 

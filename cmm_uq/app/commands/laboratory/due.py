@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of
-from cmm_uq.laboratory.due.doubt import with_parts
+from cmm_uq.laboratory.due.doubt import parts_measured, with_parts
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used
@@ -220,7 +220,7 @@ def history_of(
     fleet: Path | None = None,
     parts: Collection[Path] = (),
 ) -> MachineHistory:
-    """``parts``: folders with reports of parts anywhere below; those beside the records, to two folders deep, by default."""
+    """``parts``: folders with reports of parts that are not recorded; beside the records, two folders deep, by default."""
     day, learnt = on or _today(), read_fleet(fleet)
     with open_records(where, read_only=True) as records:
         found = records.machine(machine)
@@ -229,14 +229,16 @@ def history_of(
         entries = (one.entry[one.day <= day.toordinal()] for one in series.values())
         stated = outcomes_of(records, {int(until[-1]) for until in entries if len(until)})
         history = machine_history(found, certificates, series, day, _priors(learnt, found), stated)
-    for folder in parts:
-        if not folder.is_dir():
-            raise CmmUqError("is no folder", where=str(folder), fix="Name a folder with reports of parts")
-        check_permitted(folder, "Mend its permissions, or name another folder")
-    below = [(home, f"{deep}results.json") for deep in ("*/", "*/*/") if home is not None]
-    places = [(folder, "**/results.json") for folder in parts] or below
-    reports = sorted({file for folder, names in places for file in folder.glob(names)})
-    return replace(history, doubtful=with_parts(history.doubtful, found, reports, day))
+        for folder in parts:
+            if not folder.is_dir():
+                raise CmmUqError("is no folder", where=str(folder), fix="Name a folder with reports of parts")
+            check_permitted(folder, "Mend its permissions, or name another folder")
+        below = [(home, f"{deep}results.json") for deep in ("*/", "*/*/") if home is not None]
+        places = [(folder, "**/results.json") for folder in parts] or below
+        reports = sorted({file for folder, names in places for file in folder.glob(names)}) if history.doubtful else []
+        recorded = [one for one in records.parts(found.serial) if one.day <= day]
+        every = (*recorded, *parts_measured(found, reports, records.has_results))
+    return replace(history, doubtful=with_parts(history.doubtful, every, day), parts=tuple(recorded))
 
 
 def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:

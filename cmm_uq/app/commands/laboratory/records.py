@@ -17,14 +17,15 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of as whole_file
 from cmm_uq.base.output import MANIFEST, finish_interrupted, interruption, read_manifest, sha256_of
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.job import PartJob, part_of
 from cmm_uq.jobs.source import RESULTS
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.facts import RecordedCertificate
+from cmm_uq.laboratory.records.facts import PART, RecordedCertificate
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
-COMMANDS = ("report", "diagnose")
+COMMANDS = ("report", "diagnose", PART)
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class ImportedReports:
 
 
 def import_reports(records: Records | Path, folders: Iterable[Path]) -> ImportedReports:
-    """Record reports and diagnoses that were written before, oldest first, all in one transaction.
+    """Record reports, diagnoses and reports of parts that were written before, oldest first, all in one transaction.
 
     ``records``: opened, or the file in which they are begun where something is to be recorded.
     """
@@ -52,9 +53,11 @@ def import_reports(records: Records | Path, folders: Iterable[Path]) -> Imported
             if digest in contents or (opened is not None and opened.has_results(digest) is not None):
                 known.append(path)
                 continue
-            job: Job | None = None
+            job: Job | PartJob | None = None
             with contextlib.suppress(CmmUqError):  # its PDF is gone, or its inputs are not read any more
-                job = job_of(inputs_of(path))
+                files, manifest = inputs_of(path), read_manifest(path)
+                of_part = manifest is not None and manifest.owner.command == PART
+                job = part_of(files, machine=False) if of_part else job_of(files)
             contents[digest] = path, _content(home, path, job)
             if job is None:
                 bare.append(path)
@@ -73,12 +76,12 @@ def import_reports(records: Records | Path, folders: Iterable[Path]) -> Imported
 
 
 def reports_in(folders: Iterable[Path]) -> list[Path]:
-    """Folders with a report or a diagnosis, each once."""
+    """Folders with a report, of a part too, or a diagnosis, each once."""
     asked = tuple(folders)
     found = {path.resolve(): path for folder in asked for path in report_folders(folder)}
     if not found:
         raise CmmUqError("holds no report", where=", ".join(map(str, asked)),
-                         fix="Name folders that cmm-uq report or cmm-uq diagnose wrote")  # fmt: skip
+                         fix="Name folders that cmm-uq report, diagnose or part wrote")  # fmt: skip
     return list(found.values())
 
 
@@ -118,7 +121,7 @@ def inputs_of(folder: Path) -> dict[str, bytes]:
     return {name: attached[name] for name in wanted}
 
 
-def _content(home: Path | None, folder: Path, job: Job | None) -> dict[str, Any]:
+def _content(home: Path | None, folder: Path, job: Job | PartJob | None) -> dict[str, Any]:
     """Content of the entry of a folder whose files are as they were written."""
     manifest = read_manifest(folder)
     if manifest is None:

@@ -22,14 +22,26 @@ from cmm_uq.analysis.parts.reported import measured_of
 from cmm_uq.analysis.parts.result import conforming, middle, stated, within_bounds
 from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual, prior_influence
 from cmm_uq.analysis.parts.ways import spread, ways
-from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, Written, silent, unchanged
+from cmm_uq.app.commands.files import (
+    NOT_RECORDED,
+    REPORTS,
+    RESULTS,
+    Finished,
+    Stage,
+    Written,
+    kept_in,
+    ledger_of,
+    results_at,
+    silent,
+    unchanged,
+)
 from cmm_uq.app.commands.parts.drift import further_of
 from cmm_uq.app.commands.parts.machine import StatedMachine, state_machine, with_calibration, with_history
 from cmm_uq.app.commands.parts.proposals import foresee
 from cmm_uq.app.commands.reading import in_language
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
-from cmm_uq.base.messages import say
+from cmm_uq.base.messages import NOTHING, Text, say
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Floats
@@ -44,6 +56,8 @@ from cmm_uq.certificate.wording import effect_title
 from cmm_uq.jobs.part.feature import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob, read_part
 from cmm_uq.jobs.tables.identification import SIMULATED
+from cmm_uq.laboratory.records.facts import PART as COMMAND, Heads
+from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.maths.uncertainty.propagation import Simulated, Source, simulate, simulate_adaptively
 
 if TYPE_CHECKING:
@@ -253,45 +267,49 @@ def _prior(
 
 
 DOCUMENTS = ("part.html", "part.pdf")
-COMMAND = "part"
 
 
 def write_part(
     folder: Path, out: Path | None = None, *, options: PartOptions | None = None, force: bool = False,
-    stage: Stage = silent, language: Code | None = None,
+    stage: Stage = silent, language: Code | None = None, records: str | Path | None = NONE,
 ) -> Written[PartMeasurement]:  # fmt: skip
     """Evaluate a part's job and write ``part.html``, ``part.pdf``, ``results.json`` and what comes with them, all or none.
 
     ``out``: where to write; ``reports/<job id>`` by default. ``force``: keep what stands in the way as ``NAME.previous``
-    instead of refusing.
+    instead of refusing. ``records``: that it is kept in, as of :func:`~cmm_uq.app.commands.report.write_report`.
     """
     stage("Reading the job", 0.0)
     job = in_language(read_part(folder), language)
-    return written(job, lambda: evaluate_part(job, options, stage), out, force=force, stage=stage)
+    return written(job, lambda: evaluate_part(job, options, stage), out, force=force, stage=stage, records=records)
 
 
 def written(
     job: PartJob, evaluate: Callable[[], PartMeasurement], out: Path | None = None, *, force: bool = False,
-    stage: Stage = silent,
+    stage: Stage = silent, records: str | Path | None = NONE,
 ) -> Written[PartMeasurement]:  # fmt: skip
-    """Make sure of the folder, then evaluate, render and write, all or none."""
+    """Make sure of the folder, then evaluate, render and write, all or none, and record it with that."""
     facts = job.facts.job
     fonts_of(facts.language)  # refused before anything is computed
     folder = REPORTS / facts.id if out is None else out
     names = [file_name(name, facts.origin) for name in DOCUMENTS]
     owner, inputs = Owner(COMMAND, facts.id, facts.origin), tuple(job.folder / name for name in job.inputs)
-    with staged(folder, owner, inputs=inputs, force=force, expected=(*names, RESULTS, PROVENANCE)) as place:
+    with (
+        kept_in(records, out) as kept,
+        staged(folder, owner, inputs=inputs, force=force, expected=(*names, RESULTS, PROVENANCE)) as place,
+    ):
         measurement = evaluate()
-        contents = contents_of(measurement, stage)
+        contents = contents_of(measurement, stage, heads=kept.heads(owner))
         stage(f"Writing: {len(contents)} files to {folder}", 0.95)
-        files = place.write(contents)
+        ledger = kept.ledger(lambda history: ledger_of(history, job, COMMAND, folder, contents, RESULTS))
+        files = place.write(contents, ledger=ledger)
     stage("Done", 1.0)
-    ends = (part_summary(measurement), measurement.conforming, facts.id, facts.origin)
+    ends = (part_summary(measurement), measurement.conforming, facts.id, facts.origin, kept.said())
     return Written(measurement, contents[RESULTS], files, *ends)
 
 
-def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:
-    from cmm_uq.certificate.origin import as_json
+def contents_of(
+    found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged, heads: Heads = NOT_RECORDED
+) -> dict[str, bytes]:
     from cmm_uq.certificate.part.measurement import part_results
     from cmm_uq.certificate.render import render_html, render_pdf
 
@@ -301,9 +319,9 @@ def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Fini
                          fix="Put the machine's results into a folder of their own")  # fmt: skip
     html, pdf = (file_name(name, job.facts.job.origin) for name in DOCUMENTS)
     results = part_results(found)
-    data = as_json(results)
+    data, line = results_at(results, heads)
     stage("Composing the page", 0.88)
-    document = document_of(found)
+    document = document_of(found, line)
     stage("Rendering", 0.92)
     page = render_html(document).encode()
     facts, standing = job.facts, found.standing
@@ -316,8 +334,8 @@ def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Fini
     return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further, **found.files}
 
 
-def document_of(found: PartMeasurement) -> Document:
-    """The page, in the job's language, marked where nobody measured."""
+def document_of(found: PartMeasurement, records: Text = NOTHING) -> Document:
+    """The page, in the job's language, marked where nobody measured; ``records``: how they stood, in words."""
     from cmm_uq.certificate.document import translated as said
     from cmm_uq.certificate.origin import marked_as
     from cmm_uq.certificate.part.page import part_document
@@ -325,7 +343,7 @@ def document_of(found: PartMeasurement) -> Document:
 
     facts = found.job.facts.job
     with lettered_in(facts.language):
-        document = part_document(found)
+        document = replace(part_document(found), records=records)
     told = say(
         "Figures of this job are simulated or an example's: no part was measured, and nothing here certifies one."
     )
