@@ -270,7 +270,7 @@ def history(
     After a calibration or a check that it failed: since when it is in doubt, and the parts that were measured on it since.
     """
     from cmm_uq.app.commands.laboratory.due import history_of, write_history
-    from cmm_uq.certificate.pages.doubt import doubt_words, doubtful_parts, part_rows, parts_words
+    from cmm_uq.certificate.pages.doubt import doubt_words, doubtful_parts, part_rows
     from cmm_uq.certificate.pages.history import history_data, step_notes, summary_row, terminal_note
 
     found = history_of(machine, records, on=opt.day_of(on), fleet=fleet, parts=parts or ())
@@ -285,7 +285,13 @@ def history(
         yield from [((terminal_note(found), ""),)] if found.values else []
         yield from (((doubt_words(one), COLOURS["bad"]),) for one in found.doubtful)
         yield from screen_layout(verbose=True).table(part_rows(doubtful_parts(found)))
-        yield from [((parts_words(found), ""),)] if found.parts else []
+        last, count = (found.parts or (None,))[-1], len(found.parts)
+        reports = "one report of a part" if count == 1 else f"{count} reports of parts"
+        yield from (
+            [((f"The records have {reports} measured on it, {last.number} of {last.day} the newest.", ""),)]
+            if last
+            else []
+        )
         yield from (((text, COLOURS["open"]),) for text in (*step_notes(found), *found.remarks))
         yield from _written(files)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, plural, say, sentences
+from cmm_uq.base.messages import DASH, Text, Verbatim, day, plural, say, sentences
 from cmm_uq.certificate import document as doc
 from cmm_uq.certificate.origin import attributes
 from cmm_uq.certificate.wording import OUTCOME_WORDS
@@ -66,21 +66,6 @@ def parts_section(history: MachineHistory) -> doc.Section:
     newest = part_rows(history.parts[: -LISTED - 1 : -1])
     caption = say("The newest {shown} of {count}", shown=min(LISTED, len(history.parts)), count=len(history.parts))
     return doc.section(say("Parts measured on it"), doc.table(caption, HEADS, newest))
-
-
-def parts_words(history: MachineHistory) -> Text:
-    """How many the records have; empty without any."""
-    if not history.parts:
-        return NOTHING
-    last = history.parts[-1]
-    told = say("the newest of {day}: {number}", day=day(last.day), number=Verbatim(last.number))
-    count = len(history.parts)
-    single = say("The records have one report of a part measured on it, {newest}", newest=told)
-    return plural(
-        count,
-        one=single,
-        many=say("The records have {count} reports of parts measured on it, {newest}", count=count, newest=told),
-    )
 
 
 def part_data(part: MeasuredPart) -> dict[str, Any]:
