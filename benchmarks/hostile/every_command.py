@@ -18,6 +18,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks.hostile import cases
 from benchmarks.hostile.cases import KINDS, Case
 from benchmarks.hostile.mutators import mutate, raw_bytes
@@ -26,7 +28,7 @@ from benchmarks.hostile.seeds import BUDGETS, EXAMPLES, seeds, small_truth
 from benchmarks.hostile.values import WORDS
 
 RECORDS = "reports/records.db"
-MADE = "reports/mount"
+MADE, PART = "reports/mount", "reports/plate"
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class Line:
 
 
 JOB, IOTA = ("mount/",), ("iota/job.toml", "iota/ballbar.csv")
+OF_PART = tuple(f"{PART}/{name}" for name in ("part-simulated", "results.json", "provenance.json", "manifest.json"))
 SET = tuple(f"{MADE}/{name}" for name in ("certificate", "results.json", "provenance.json", "manifest.json"))
 LINES = (
     Line("new ballbar new --from @iota/ballbar.csv --machine M --set job.date=2026-05-31", ("iota/ballbar.csv",)),
@@ -69,6 +72,9 @@ LINES = (
     Line("report @mount --out out --records none --sign @key.p12", ("key.p12",)),
     Line("report --scheduled @mount --schedule @schedule.toml --quiet", ("schedule.toml", "mount/")),
     Line("part @part --trials 1000 --out out --records none", ("part/",)),
+    Line(f"verify @{PART} --no-rerun --records @{RECORDS}", (*OF_PART, RECORDS), 3),
+    Line(f"records verify = --witness @{PART}", (*OF_PART, RECORDS)), Line(f"records import @{PART} =", OF_PART),
+    Line("release P-2026-05-31 --by A._Huber =", (RECORDS,)),
     Line("batch @mount --out out --records none --workers 1", JOB),
     Line("diagnose @iota --out out --records none", IOTA), Line("effects wave --job @own", ("own/job.toml",)),
     Line("check @own", ("own/job.toml",)), Line("plan @plan --out out --no-power", ("plan/",)),
@@ -183,6 +189,7 @@ def _made() -> Mapping[str, bytes]:
         for name, source in (("part", "part-plate-simulated"), ("plan", "plan-ballbar")):
             shutil.copytree(EXAMPLES / source, folder / name)
         (folder / "key.p12").write_bytes(key.key)
+        _report_part(folder)
         signed = run("sign", *(folder / MADE / f"certificate.{form}" for form in ("pdf", "xml")), "--key", folder / "key.p12",
                      "--out", folder / "signed", "--records", "none")  # fmt: skip
         assert signed.returncode == 0, signed.stderr
@@ -208,6 +215,21 @@ def _made() -> Mapping[str, bytes]:
         "profile.toml": profile, "log.txt": b"20.01, 20.02; 12.0\r\n" * 20, "cloud.csv": b"u_mm,v_mm,d_mm,e_mm,f_mm\n" + rows,
         "schedule.toml": b'[run]\nout = "reports"\nrecords = "none"\nquiet_s = 0.0\n',
     }  # fmt: skip
+
+
+def _report_part(folder: Path) -> None:
+    """A part's report in the records, and the entry of one that the machine 77 measured."""
+    from cmm_uq.app.commands.parts.part import PartOptions, write_part
+    from cmm_uq.laboratory.records import open_records
+    from tests.laboratory.records.test_parts import part
+    from tests.part_machines import THERE, by_results, plate_files
+
+    with open_records(folder / RECORDS) as records:
+        records.append_all([(*part(dt.date(2026, 5, 31), "77", "Optical digitizer")[:2], None)])
+    for name, content in plate_files(by_results(), np.zeros((60, 3)), **THERE).items():
+        (folder / "plate" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "plate" / name).write_bytes(content)
+    write_part(folder / "plate", folder / PART, options=PartOptions(trials=1000), records=folder / RECORDS)
 
 
 def unaltered(number: int) -> Case:

@@ -285,13 +285,9 @@ def history(
         yield from [((terminal_note(found), ""),)] if found.values else []
         yield from (((doubt_words(one), COLOURS["bad"]),) for one in found.doubtful)
         yield from screen_layout(verbose=True).table(part_rows(doubtful_parts(found)))
-        last, count = (found.parts or (None,))[-1], len(found.parts)
-        reports = "one report of a part" if count == 1 else f"{count} reports of parts"
-        yield from (
-            [((f"The records have {reports} measured on it, {last.number} of {last.day} the newest.", ""),)]
-            if last
-            else []
-        )
+        for last in found.parts[-1:]:
+            measured = "One part" if len(found.parts) == 1 else f"{len(found.parts)} parts"
+            yield ((f"{measured} measured on it, as recorded; the newest is {last.number} of {last.day}.", ""),)
         yield from (((text, COLOURS["open"]),) for text in (*step_notes(found), *found.remarks))
         yield from _written(files)
 

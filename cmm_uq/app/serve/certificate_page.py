@@ -27,7 +27,7 @@ from cmm_uq.certificate.wording import effect_of, effect_title, probability, siz
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import unit_of
 from cmm_uq.laboratory.records.facts import PART, Entry, RecordedCertificate
-from cmm_uq.laboratory.records.listing import entry_of
+from cmm_uq.laboratory.records.listing import entry_of, parts_of
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
@@ -38,10 +38,10 @@ def certificate_page(view: SiteView, request: WebRequest) -> p.WebPage:
     files = files_of(entry, folder, view.records.signed(one.entry))
     values = [(value.quantity, value.unit, value) for value in one.values]
     decided, standing = decided_words(one)
-    stated = Verdicts.of_results(entry.data)
+    stated, part = Verdicts.of_results(entry.data), parts_of(view.records, [one.entry]).get(one.entry)
     return p.page(
         "certificate.html", "/parts" if one.command == PART else "/certificates", one=one, entry=entry,
-        machine=machine_cell(one.machine), decided=decided, part=part_cell(entry.data) if one.command == PART else None,
+        machine=machine_cell(one.machine), decided=decided, part=part and part_cell(part), of_part=part,
         origin=None if one.origin == "measured" else p.ORIGINS.get(one.origin, Verbatim(one.origin)), standing=standing,
         warning=p.NOT_MEASURED.get(one.origin), decision=p.cell_of(p.DECISIONS, one.decision),
         outcomes=[(f"{each.by}, {each.name}" if each.by else each.title or each.name, p.cell_of(p.DECISIONS, each.outcome))

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from cmm_uq.app.commands.laboratory.due import due_in
 from cmm_uq.app.serve import page as p
@@ -21,9 +21,10 @@ from cmm_uq.laboratory.records.facts import ChainFinding
 from cmm_uq.laboratory.records.listing import (
     CertificateFilter,
     ListedCertificate,
+    ListedPart,
     Newest,
     chosen,
-    contents,
+    parts_of,
     standing_of_all,
 )
 from cmm_uq.laboratory.records.store import Records
@@ -141,20 +142,18 @@ def parts_table(
 ) -> PageTable:
     """Reports of parts as rows; without their machine where all are of one."""
     columns = [i for i in range(len(PART_COLUMNS)) if machine or i != 2]
-    said = dict(contents(records, [one.entry for one in rows]))
+    said = parts_of(records, [one.entry for one in rows])
     cells = [
         (certificate_cell(one), part_cell(said[one.entry]), machine_cell(one.machine, one.machine_name), p.day_cell(one.day),
-         Cell(p.shown(said[one.entry]["certificate"]["number"])), p.cell_of(p.DECISIONS, one.decision),
-         p.cell_of(p.STATES, one.state))
+         Cell(p.shown(said[one.entry].certificate)), p.cell_of(p.DECISIONS, one.decision), p.cell_of(p.STATES, one.state))
         for one in rows
     ]  # fmt: skip
     shown = tuple(tuple(row[i] for i in columns) for row in cells)
     return PageTable(caption, tuple(PART_COLUMNS[i] for i in columns), shown, empty)
 
 
-def part_cell(content: Mapping[str, Any]) -> Cell:
-    part = content["part"]
-    return Cell(p.shown(part["name"]), note=Verbatim(" ".join(filter(None, (part["serial"], part["drawing"])))))
+def part_cell(part: ListedPart) -> Cell:
+    return Cell(p.shown(part.name), note=Verbatim(" ".join(filter(None, (part.serial, part.drawing)))))
 
 
 Listed = TypeVar("Listed")

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from sqlalchemy import ColumnElement, Connection, func, or_, select
 
 from cmm_uq.jobs.verdicts import Verdicts, gravest
-from cmm_uq.laboratory.records.facts import BY_NAME, PERFORMANCE, STANDING, Entry, RecordedMachine, spelled
+from cmm_uq.laboratory.records.facts import BY_NAME, PART, PERFORMANCE, STANDING, Entry, RecordedMachine, spelled
+from cmm_uq.laboratory.records.place import told
 from cmm_uq.laboratory.records.queries import RECORDED, adjusted_before, blocks, newest_of_machine
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
@@ -211,6 +212,28 @@ def contents(records: Records, numbers: Collection[int]) -> Iterator[tuple[int, 
         for block in blocks(sorted(numbers)):
             query = select(entries.c.number, entries.c.content).where(entries.c.number.in_(block))
             yield from ((int(number), json.loads(content)) for number, content in connection.execute(query))
+
+
+class ListedPart(NamedTuple):
+    """Which part a report is of, and the certificate of the machine that it stands on."""
+
+    name: str
+    serial: str
+    drawing: str
+    certificate: str
+    calibrated: str
+
+
+def parts_of(records: Records, numbers: Collection[int]) -> dict[int, ListedPart]:
+    """Of the entries of reports of parts among some, by their numbers."""
+    with told(records.place, rows=True):
+        return {
+            number: ListedPart._make(str(one) for one in (
+                *(said["part"][name] for name in ("name", "serial", "drawing")),
+                *(said["certificate"][name] for name in ("number", "calibrated")),
+            ))
+            for number, said in contents(records, numbers) if said.get("command") == PART
+        }  # fmt: skip
 
 
 def entry_of(records: Records, number: int) -> Entry | None:

@@ -28,10 +28,11 @@ from tests.app.serve.conftest import Looked
 from tests.app.serve.laboratory import HOSTILE, RESULTS, TODAY, TURNED, entry_of, opened_in
 from tests.certificate.saying import said
 from tests.laboratory.records.histories import certificate, made, moment
+from tests.laboratory.records.test_parts import MARCH, calibrated, part
 
 ADDRESSES = ["/", "/?state=overdue", "/?text=K1", "/machine?serial=K1", "/machine?serial=K3", "/certificates",
              "/certificates?origin=simulated", "/certificates?machine=K1", "/diagnoses", "/diagnoses?verdict=all",
-             "/artefacts", "/file", "/integrity", "/nowhere", "/certificates?page=x"]  # fmt: skip
+             "/parts", "/artefacts", "/file", "/integrity", "/nowhere", "/certificates?page=x"]  # fmt: skip
 
 
 class Shown(HTMLParser):
@@ -372,3 +373,20 @@ def test_every_text_of_every_page_is_a_message_or_of_the_records(
 def test_no_template_has_a_word_of_its_own(path: Path) -> None:
     bare = re.sub(r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
     assert re.findall(r"[A-Za-z]{2,}", " ".join(Shown(bare).texts)) == []
+
+
+def test_reports_of_parts_are_listed_and_shown_with_their_machine_and_its_certificate(tmp_path: Path) -> None:
+    with open_records(tmp_path / "records.db", create=True) as records:
+        records.append_all([calibrated(MARCH), part(MARCH), part(MARCH, job="s", number="S-1", origin="simulated")])
+    looked = Looked(tmp_path / "records.db")
+    texts = [
+        " ".join(Shown(looked.text(f"/{at}")).texts) for at in ("parts", "machine?serial=1102", "certificate?entry=2")
+    ]
+    for text in texts:
+        assert all(word in text for word in (f"P-{MARCH}", "Flange", "F-7", "K-1"))
+    assert "S-1" not in texts[0]
+    assert "S-1" in looked.text("/parts?origin=simulated")
+    assert "/parts?machine=1102" in looked.text("/machine?serial=1102")
+    assert f"P-{MARCH}" not in looked.text("/certificates")
+    assert "Report of a part" in texts[2]
+    assert "Values as stated" not in texts[2]

@@ -329,10 +329,11 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
     other = certificate_named(records, replaced_by, ("released",))
     if other.entry == certificate.entry:
         raise CmmUqError("a certificate does not replace itself", where="--replaced-by", fix="Name the new one's entry")
-    alike = other.command == certificate.command and (other.machine == certificate.machine or other.command == PART)
-    if other.state != "released" or not alike:  # a part may be measured again on another machine
+    alike = PART not in (certificate.command, other.command) and other.machine == certificate.machine
+    if other.state != "released" or not (alike or other.command == certificate.command == PART):
         why = f"is {other.state}" if other.state != "released" else f"is of {other.machine}, not {certificate.machine}"
-        why = "is no report of a part" if alike is False and certificate.command == PART else why
+        if PART in (certificate.command, other.command):  # which may be measured again on another machine
+            why = f"is {'a' if other.command == PART else 'no'} report of a part" if other.state == "released" else why
         fix = "Name a released certificate of this machine"
         raise CmmUqError(f"{other.number} {why}", where="--replaced-by", fix=fix)
     refuse_denial(records, certificate, other, reason)
