@@ -47,7 +47,7 @@ RESULTS: Mapping[str, str] = {
     "acquisition.gaps[].KEY": "When an instrument was silent: since when and how long in s since the start, and why.",
     "acquisition.undone[].KEY": "A point that was taken back, with the reason.",
     "acquisition.files.SHA256": "Name of a file that points were read from, by its SHA-256.",
-    "iso17025[].clause": "Clause of ISO/IEC 17025:2017; the list is of every certificate, drafts among them.",
+    "iso17025[].clause": "Clause of ISO/IEC 17025:2017; of every certificate, and of every report of a measured part.",
     "iso17025[].asks": "What the clause asks for.",
     "iso17025[].status": "stated; missing, which makes a draft; not applicable; laboratory, which no certificate shows.",
     "iso17025[].stated": "What satisfies it; null where nothing does.",
@@ -55,7 +55,7 @@ RESULTS: Mapping[str, str] = {
     "traceability.claim": "traceable; by evidence of the laboratory; not shown; none needed, of no certified length.",
     "traceability.statement": "The statement of traceability on the certificate.",
     "records": "How the laboratory's records stood when this was made; null where it was kept in none.",
-    "records.entries": "Number of the newest entry then, before the certificate's own; 0 where there was none.",
+    "records.entries": "Number of the newest entry then, before the document's own; 0 where there was none.",
     "records.head": "Its hash; 64 zeros where there was none.",
     "records.at": "Its moment, UTC; null where there was none.",
     "estimates.EFFECT.PARAMETER": "Quantity: a parameter of an effect of the model, over all of `diagnosis.remaining`.",
@@ -508,6 +508,7 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = {
             "", "(x₁ − x₂)/√(U₁² + U₂²): beyond 1 in size they contradict each other (ISO/IEC 17043:2023)."),
         "other_methods.compared[].why": ("", "Why they differ, in words."),
         "warnings": ("", "What must be known before a figure is used."),
+        **{key: ("", text) for key, text in RESULTS.items() if key.startswith(("iso17025[]", "records"))},
 }  # fmt: skip
 """By key, its unit, empty where it has none, and what it is."""
 

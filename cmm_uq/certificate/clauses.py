@@ -313,9 +313,9 @@ def of_every_report(
 PART_TITLE = say("Measurement report")
 
 
-def of_a_part(facts: PartFile) -> tuple[Requirement, ...]:
-    """What is asked of the report of a part; nothing of one that is an example's or simulated."""
-    if facts.job.origin != MEASURED:
+def of_a_part(facts: PartFile, measured: object | None) -> tuple[Requirement, ...]:
+    """What is asked of the report of a part; nothing of one that was planned or simulated, or is an example's."""
+    if facts.job.origin != MEASURED or measured is None:
         return ()
     item = asked("7.8.2.1 g", say("serial number of the part"), facts.part.serial, "[part] serial")
     conditions = asked("7.8.4.1 b", say("conditions"), facts.job.conditions, "[job] conditions")

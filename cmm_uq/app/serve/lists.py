@@ -66,8 +66,13 @@ def _choice(request: WebRequest, command: str) -> CertificateFilter:
 
 def _choices(origin: str) -> dict[str, Any]:
     """What can be chosen, and a warning where nobody measured."""
-    return {"origin": origin, "warning": p.NOT_MEASURED.get(origin), "states": _options(p.STATES),
-            "decisions": _options(p.DECISIONS), "origins": p.ORIGINS.items()}  # fmt: skip
+    return {
+        "origin": origin,
+        "warning": p.NOT_MEASURED.get(origin),
+        "states": _options(p.STATES),
+        "decisions": _options(p.DECISIONS),
+        "origins": p.ORIGINS.items(),
+    }
 
 
 def diagnoses_page(view: v.SiteView, request: WebRequest) -> p.WebPage:

@@ -132,9 +132,14 @@ def certificates_table(
 
 
 PART_COLUMNS = p.columns(
-    say("Report"), say("Part"), say("Machine"), (say("Measured on"), "day"), say("Certificate of the machine"),
-    say("Decision"), say("State"),
-)  # fmt: skip
+    say("Report"),
+    say("Part"),
+    say("Machine"),
+    (say("Measured on"), "day"),
+    say("Certificate of the machine"),
+    say("Decision"),
+    say("State"),
+)
 
 
 def parts_table(
@@ -144,10 +149,17 @@ def parts_table(
     columns = [i for i in range(len(PART_COLUMNS)) if machine or i != 2]
     said = parts_of(records, [one.entry for one in rows])
     cells = [
-        (certificate_cell(one), part_cell(said[one.entry]), machine_cell(one.machine, one.machine_name), p.day_cell(one.day),
-         Cell(p.shown(said[one.entry].certificate)), p.cell_of(p.DECISIONS, one.decision), p.cell_of(p.STATES, one.state))
+        (
+            certificate_cell(one),
+            part_cell(said[one.entry]),
+            machine_cell(one.machine, one.machine_name),
+            p.day_cell(one.day),
+            Cell(p.shown(said[one.entry].certificate)),
+            p.cell_of(p.DECISIONS, one.decision),
+            p.cell_of(p.STATES, one.state),
+        )
         for one in rows
-    ]  # fmt: skip
+    ]
     shown = tuple(tuple(row[i] for i in columns) for row in cells)
     return PageTable(caption, tuple(PART_COLUMNS[i] for i in columns), shown, empty)
 

@@ -28,7 +28,7 @@ from cmm_uq.analysis.parts.ways import Way
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.clauses import Requirement, of_a_part
+from cmm_uq.certificate.clauses import of_a_part
 from cmm_uq.certificate.origin import NAME, FurtherCertificate, PassedTest, attributes, further_data, passed_data, rows
 from cmm_uq.certificate.sections.regions import (
     evidence_data,
@@ -211,10 +211,6 @@ class PartMeasurement:
         return gravest([*self.outcomes, *left]) if self.outcomes else None
 
     @property
-    def requirements(self) -> tuple[Requirement, ...]:
-        return () if self.measured is None else of_a_part(self.job.facts)
-
-    @property
     def judged_by(self) -> Text:
         return rule_words(self.job.facts.decision.rule)
 
@@ -293,7 +289,7 @@ def part_results(found: PartMeasurement) -> dict[str, Any]:
         **({"foreseen": foreseen_data(found, found.foreseen)} if found.foreseen else {}),
         "other_methods": methods_data(found.methods), **_reported(found.job.reported),
         "warnings": [_plain(text) for text in found.warnings],
-        **({"iso17025": [one.data for one in found.requirements]} if found.requirements else {}),
+        **({"iso17025": asks} if (asks := [one.data for one in of_a_part(facts, found.measured)]) else {}),
     }  # fmt: skip
 
 

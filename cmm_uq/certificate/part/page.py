@@ -16,7 +16,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, holding,
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate import certificate, document as doc
-from cmm_uq.certificate.clauses import PART_TITLE as TITLE, STATEMENTS, not_stated
+from cmm_uq.certificate.clauses import PART_TITLE as TITLE, STATEMENTS, not_stated, of_a_part
 from cmm_uq.certificate.document import Column, Paragraph, Section, Table, columns, section, table
 from cmm_uq.certificate.part import budget_section as causes, method
 from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
@@ -138,7 +138,7 @@ PLANNED = say("Measurement uncertainty")
 
 def part_document(found: PartMeasurement) -> doc.Document:
     facts, measured = found.job.facts, found.measured is not None
-    lacking = [one for one in found.requirements if one.status == "missing"]
+    lacking = [one for one in of_a_part(facts, found.measured) if one.status == "missing"]
     sections = (
         results_section(found), conformity_section(found), part_section(found),
         errors_section(found), causes.budget_section(found), causes.priors_section(found),

@@ -88,8 +88,15 @@ def parts_measured(
             own = spelled(str(by["serial"] or "")) if serial else ""
             if own == serial if own else spelled(str(by["machine"])) == name:
                 number, outcome = job.get("number") or job["id"], data["decision"]["outcome"]
-                yield MeasuredPart.of(part, by["date"], by["number"], day=job["date"], folder=str(file.parent), number=number,
-                                      outcome=outcome)  # fmt: skip
+                yield MeasuredPart.of(
+                    part,
+                    by["date"],
+                    by["number"],
+                    day=job["date"],
+                    folder=str(file.parent),
+                    number=number,
+                    outcome=outcome,
+                )
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             if b'"cmm-uq/part/' in content:
                 raise CmmUqError(

@@ -131,12 +131,16 @@ def _of_part(data: Mapping[str, Any]) -> dict[str, Any]:
     return _of_results({**job, "machine": by["machine"], "serial": by["serial"]}) | {
         "number": str(job.get("number") or job["id"]),
         "part": {name: str(part[name] or "") for name in ("name", "serial", "drawing")},
-        "plan": "job.toml", "measured": any(one["value"] is not None for one in data["characteristics"]),
+        "plan": "job.toml",
+        "measured": any(one["value"] is not None for one in data["characteristics"]),
         "certificate": {
-            "number": str(by["number"] or ""), "laboratory": str(by["laboratory"] or ""), "calibrated": str(by["date"]),
-            "due": by["valid_until"] and str(by["valid_until"]), "files": list(map(str, by["files"])),
+            "number": str(by["number"] or ""),
+            "laboratory": str(by["laboratory"] or ""),
+            "calibrated": str(by["date"]),
+            "due": by["valid_until"] and str(by["valid_until"]),
+            "files": list(map(str, by["files"])),
         },
-    }  # fmt: skip
+    }
 
 
 def _quantities(data: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

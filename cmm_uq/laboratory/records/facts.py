@@ -273,14 +273,29 @@ class MeasuredPart:
 
     @classmethod
     def of(
-        cls, part: Mapping[str, Any], calibrated: str, certificate: object, *, day: str, folder: str, number: object,
-        outcome: object, entry: int = 0,
-    ) -> MeasuredPart:  # fmt: skip
+        cls,
+        part: Mapping[str, Any],
+        calibrated: str,
+        certificate: object,
+        *,
+        day: str,
+        folder: str,
+        number: object,
+        outcome: object,
+        entry: int = 0,
+    ) -> MeasuredPart:
         """As files and entries state it, with ``None`` for what they leave open."""
         return cls(
-            dt.date.fromisoformat(day), dt.date.fromisoformat(calibrated), folder, str(number), str(part["name"] or ""),
-            str(part["serial"] or ""), str(certificate or ""), str(outcome or ""), entry,
-        )  # fmt: skip
+            dt.date.fromisoformat(day),
+            dt.date.fromisoformat(calibrated),
+            folder,
+            str(number),
+            str(part["name"] or ""),
+            str(part["serial"] or ""),
+            str(certificate or ""),
+            str(outcome or ""),
+            entry,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -228,12 +228,16 @@ def parts_of(records: Records, numbers: Collection[int]) -> dict[int, ListedPart
     """Of the entries of reports of parts among some, by their numbers."""
     with told(records.place, rows=True):
         return {
-            number: ListedPart._make(str(one) for one in (
-                *(said["part"][name] for name in ("name", "serial", "drawing")),
-                *(said["certificate"][name] for name in ("number", "calibrated")),
-            ))
-            for number, said in contents(records, numbers) if said.get("command") == PART
-        }  # fmt: skip
+            number: ListedPart._make(
+                str(one)
+                for one in (
+                    *(said["part"][name] for name in ("name", "serial", "drawing")),
+                    *(said["certificate"][name] for name in ("number", "calibrated")),
+                )
+            )
+            for number, said in contents(records, numbers)
+            if said.get("command") == PART
+        }
 
 
 def entry_of(records: Records, number: int) -> Entry | None:

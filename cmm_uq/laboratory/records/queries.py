@@ -163,11 +163,18 @@ class RecordQueries:
             each = ((json.loads(row.content), row) for row in connection.execute(ours))
             return [
                 facts.MeasuredPart.of(
-                    said["part"], said["certificate"]["calibrated"], said["certificate"]["number"], day=row.day,
-                    folder=_opened(self._before, row.folder), number=row.called, outcome=row.decision, entry=row.number,
+                    said["part"],
+                    said["certificate"]["calibrated"],
+                    said["certificate"]["number"],
+                    day=row.day,
+                    folder=_opened(self._before, row.folder),
+                    number=row.called,
+                    outcome=row.decision,
+                    entry=row.number,
                 )
-                for said, row in each if said["measured"]
-            ]  # fmt: skip
+                for said, row in each
+                if said["measured"]
+            ]
 
     def signatures(self, certificate: int) -> list[facts.ReleaseSignature]:
         """Who released, withdrew or replaced a certificate, in order."""

@@ -23,6 +23,7 @@ from cmm_uq.analysis.conformity.limits import LimitDecision
 from cmm_uq.analysis.parts.budget import PointErrors
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.base.messages import say
+from cmm_uq.certificate.clauses import of_a_part
 from cmm_uq.certificate.document import Document, Overview, Section, Table
 from cmm_uq.certificate.part.budget_section import by_family, unseen_section, ways_section
 from cmm_uq.certificate.part.figures import _remarks
@@ -393,11 +394,10 @@ def test_a_complete_report_is_no_draft_and_what_another_lacks_is_named(measured:
     assert [one.name for one in whole.signatures] == ["A. Person"]
     assert whole.date == dt.date(2026, 6, 1)
     job = plate(job={"id": "plate", "date": dt.date(2026, 5, 31), "customer": "C"})
-    every = replace(measured, job=replace(job, measured=measured.job.measured)).requirements
-    missing = [one for one in every if one.status == "missing"]
+    missing = [one for one in of_a_part(job.facts, measured.measured) if one.status == "missing"]
     assert {"[part] serial", "[laboratory] name", "[job] conditions"} <= {one.key for one in missing}
     assert "[job] customer" not in {one.key for one in missing}
-    assert not [one for one in measured.requirements if one.status == "missing"]
+    assert not [one for one in of_a_part(measured.job.facts, measured.measured) if one.status == "missing"]
 
 
 def test_what_is_not_measured_and_not_stated_is_said(measured: PartMeasurement) -> None:
