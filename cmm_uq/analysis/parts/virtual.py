@@ -320,9 +320,10 @@ class Virtual:
             place.inverses(exact=self.exact)
         if n < 2 * THREADED:
             return self._drawn(random, n)
-        halves = n // 2, n - n // 2  # of streams of their own: the same numbers on any number of cores
-        with ThreadPoolExecutor(len(halves)) as threads:
-            return np.concatenate(list(threads.map(self._drawn, random.spawn(len(halves)), halves)))
+        one, other = random.spawn(2)  # a stream for each half: the same numbers on any number of cores
+        with ThreadPoolExecutor(1) as thread:
+            later = thread.submit(self._drawn, other, n - n // 2)
+            return np.concatenate([self._drawn(one, n // 2), later.result()])
 
     def _drawn(self, random: np.random.Generator, n: int) -> Floats:
         counts = np.full(len(self.places), n // len(self.places))

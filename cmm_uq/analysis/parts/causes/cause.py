@@ -139,8 +139,8 @@ class PointScatter(PartCause):
 
         def draw(random: np.random.Generator, n: int) -> Floats:
             drawn = random.standard_normal((n, *size.shape))
-            if scale is not None:
-                drawn *= np.asarray(scale(random, n))[:, None, :]
+            for axis, factor in enumerate([] if scale is None else np.asarray(scale(random, n)).T):
+                drawn[:, :, axis] *= factor[:, None]
             return drawn.reshape(n, -1)
 
         axes = np.eye(3) if turn is None else turn
@@ -151,7 +151,7 @@ class PointScatter(PartCause):
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
         along = coefficients.reshape(len(coefficients), -1, 3)[:, rows] * self.size[rows]
-        return np.asarray(along @ self.turn)
+        return np.asarray((along.reshape(-1, 3) @ self.turn).reshape(along.shape))
 
 
 def _few(heights: Floats) -> Floats:
@@ -174,7 +174,7 @@ def _few(heights: Floats) -> Floats:
 def normal(sd: ArrayLike) -> Draw:
     """Independent normal coefficients about zero of standard deviations (K,)."""
     each = np.asarray(sd, dtype=np.float64)
-    return lambda random, n: random.standard_normal((n, len(each))) * each
+    return lambda random, n: np.multiply(drawn := random.standard_normal((n, len(each))), each, out=drawn)
 
 
 def components(kernel: Floats) -> Floats:
