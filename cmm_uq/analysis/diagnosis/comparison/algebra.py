@@ -34,10 +34,10 @@ def interpolated(at: Floats, nodes: Floats, values: Floats) -> Floats:
     at -= nodes[0]
     at *= last / (nodes[-1] - nodes[0])
     np.clip(at, 0, last, out=at)
-    before = np.minimum(at.astype(np.int64), last - 1)
+    before = at.astype(np.intp)
     at -= before
-    at *= np.diff(values)[before]
-    at += values[before]
+    at *= np.append(np.diff(values), 0.0).take(before)
+    at += values.take(before)
     return at
 
 
@@ -154,7 +154,9 @@ class SigmaIntegral:
         whole = np.concatenate([square, every], axis=2)
         if self.table is not None or not self.degrees:
             left = np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ whole
-            return log_sum_in(self(left) + constant[..., None], axes)
+            left = self(left)
+            left += constant[..., None]
+            return log_sum_in(left, axes)
         half, most = 0.5 * self.degrees, float(constant.max())
         factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
         left = np.concatenate([-factor * gain, factor], axis=3) @ whole
