@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from io import StringIO
 from math import isfinite
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -133,8 +134,10 @@ def _versioned(package: str, version: str) -> Text:
 
 def as_json(data: Mapping[str, Any]) -> bytes:
     """Plain data as UTF-8 JSON with finite numbers of ten digits, so that the last bits of rounding do not show."""
+    text = StringIO()  # a list of all its parts, as dumps makes, is ten times as large
     try:
-        return (json.dumps(_rounded(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+        json.dump(_rounded(data), text, indent=2, ensure_ascii=False, allow_nan=False)
+        return f"{text.getvalue()}\n".encode()
     except ValueError as error:
         raise CmmUqError(f"a figure is not finite: {error}", where="results.json",
                          fix="Look for a number in the input that no measurement gives") from error  # fmt: skip

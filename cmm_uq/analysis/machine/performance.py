@@ -41,6 +41,7 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 _TAILS = [0.025, 0.5, 0.975]
 # lengths, each by every coefficient of the machine, that memory holds; and ordered pairs of points that are looked at for them
 _LENGTHS, _PAIRS = 20_000, 1_000_000
+_AT_ONCE = 2_000_000  # errors of lengths that are copied at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +56,13 @@ class MachinePerformance:
     def figures(self) -> Mapping[str, Quantity]:
         if not self.of_bar:
             return {}
-        drawn, of_mean = (accuracy.figures(MICROMETRE * errors) for errors in (self.errors, self.errors.mean(axis=0)))
-        names = [name for name in UNITS if name != "mean_length_mm"]
-        return {name: _quantity(drawn[name], float(of_mean[name]), UNITS[name]) for name in names}
+        parts = np.array_split(self.errors, 1 + self.errors.size // _AT_ONCE)
+        drawn, of_mean = [accuracy.figures(MICROMETRE * some) for some in parts], self.errors.mean(axis=0) * MICROMETRE
+        return {
+            name: _quantity(np.concatenate([one[name] for one in drawn]), float(mean), UNITS[name])
+            for name, mean in accuracy.figures(of_mean).items()
+            if name != "mean_length_mm"
+        }
 
     def of_statement(self, statement: Statement) -> tuple[float, Quantity] | None:
         """The largest of what a statement decides, µm: as recorded, and of the machine, of the same lengths without noise.
@@ -88,13 +93,14 @@ class MachinePerformance:
 
 
 def performance_of(model: RecordingModel, errors: Floats) -> MachinePerformance | None:
-    """Of draws (N, m), mm, of the errors of the lengths between :func:`rows_of`; ``None`` of an artefact without lengths."""
+    """Of draws (N, m), mm, of errors of lengths, which become µm; ``None`` of an artefact without lengths."""
     artefact, rows = model.artefact, rows_of(model.artefact)
     if rows is None:
         return None
     found = artefact.indications()
     recorded = None if found is None or not np.array_equal(found.rows, rows) else found.errors / MICROMETRE
-    return MachinePerformance(artefact.points, rows, errors / MICROMETRE, recorded, artefact.lengths() is not None)
+    errors /= MICROMETRE
+    return MachinePerformance(artefact.points, rows, errors, recorded, artefact.lengths() is not None)
 
 
 def _quantity(draws: Floats, of_mean: float, of_unit: str) -> Quantity:

@@ -232,8 +232,11 @@ class DrawnErrors:
             np.linalg.norm(np.diff(xyz[rows], axis=1)[:, 0], axis=1)
             for xyz in (model.predicted(about), model.placed(about))
         )
-        parts = np.array_split(np.arange(len(rows)), 1 + len(rows) // _AT_ONCE)
-        return np.asarray(shown - true + np.hstack([added(some) for some in parts]))
+        found = np.empty((len(own), len(rows)))
+        for some in np.array_split(np.arange(len(rows)), 1 + len(rows) // _AT_ONCE):
+            found[:, some] = added(some)
+        found += shown - true
+        return found
 
 
 def other_errors(model: RecordingModel) -> list[Unmodelled]:

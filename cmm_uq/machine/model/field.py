@@ -26,6 +26,7 @@ from itertools import product
 
 import numpy as np
 import scipy
+from numpy.polynomial.chebyshev import chebvander
 
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Points
@@ -53,6 +54,8 @@ READ: Mapping[str, Text] = {  # of axes of which it is stated how they are read
 ALLOWED = {POSITION: 20.0, STRAIGHTNESS: 50.0, ROTATION: 30.0}
 _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
 _AT_ONCE = 1_000_000  # covariances of readings, or displacements, that are held at once
+_MANY, _FEW = 20_000, 1000  # readings up to which the covariance is taken of each; up to which, where cells are known
+_PERIODS, _DEGREE = 8, 54  # shortest periods in a cell of an axis, and polynomials: off by 10⁻¹³ of the largest
 _LOOKED_AT = 61  # readings
 TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
 _EACH = 4  # of these in each band, where the size of an error goes by its period
@@ -196,6 +199,7 @@ class GivenPeriod(Effect):
         self.axis = self.along_motion = effect.axis
         said = (Parameter(f"said {j}", unit("1"), 0.0) for j in range(1, into.shape[1] + 1))
         self.coefficients = (*self.sum.coefficients, *said)
+        self._cells: dict[float, Floats] = {}  # polynomials (q, r), by cell of the axis
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return along(self.axis, self.at(points.readings[self.axis]))
@@ -213,8 +217,20 @@ class GivenPeriod(Effect):
         return np.hstack([_waves(reading, np.ravel(self.sum.at)), self._said(reading)])
 
     def _said(self, reading: Floats) -> Floats:
-        parts = np.array_split(reading, 1 + len(reading) * len(self.readings) // _AT_ONCE)
-        return np.concatenate([covariance(self.of, part, self.readings) @ self.into for part in parts])
+        """At many readings by polynomials: the covariance has no wave that is shorter than the shortest period."""
+        if len(reading) <= (_FEW if self._cells else _MANY):
+            parts = np.array_split(reading, 1 + len(reading) * len(self.readings) // _AT_ONCE)
+            return np.concatenate([covariance(self.of, part, self.readings) @ self.into for part in parts])
+        length = _PERIODS * min(low for bands in _bands(self.of) for low, *_ in bands)
+        place, nodes = reading / length, np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
+        order, found = np.argsort(place), np.empty((len(reading), self.into.shape[1]))
+        each, begin = np.unique(np.floor(place[order]), return_index=True)
+        for cell, rows in zip(each.tolist(), np.split(order, begin[1:]), strict=True):
+            if cell not in self._cells:
+                values = self._said((cell + 0.5 + 0.5 * nodes) * length)
+                self._cells[cell] = np.linalg.solve(chebvander(nodes, _DEGREE - 1), values)
+            found[rows] = chebvander(2 * (place[rows] - cell) - 1, _DEGREE - 1) @ self._cells[cell]
+        return found
 
     def beforehand(self, random: np.random.Generator, count: int) -> Floats:
         """Draws (N, j) of the coefficients over their standard deviations, without the recording.
@@ -245,14 +261,19 @@ def _waves(reading: Floats, periods: Floats) -> Floats:
     return MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
 
 
+def _bands(effect: PeriodicScale) -> Sequence[Sequence[tuple[float, float, float]]]:
+    """Of each error that it is the sum of: periods from, to, mm, and the standard deviation of sine and cosine, µm."""
+    (shape,), own = effect.shape, effect.coefficients[0].prior_sd
+    return effect.errors or (((shape.low, shape.high, own),),)
+
+
 def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
     """(n, p) mm², of an error whose period nobody knows, at readings (n,) and (p,), mm.
 
     The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀); where σ goes by λ, of each band by its part.
     """
-    (shape,), own = effect.shape, effect.coefficients[0].prior_sd
     distance, whole = 2 * np.pi * np.abs(np.subtract.outer(one, other)), np.zeros(())
-    for bands in effect.errors or (((shape.low, shape.high, own),),):
+    for bands in _bands(effect):
         same, every = distance < _SAME * bands[0][0], np.log(bands[-1][1] / bands[0][0])
         apart = np.where(same, 1.0, distance)
         for low, high, sd in bands:

@@ -107,6 +107,20 @@ def test_draws_of_what_is_stated_have_its_covariance_and_ninety_five_of_a_hundre
     assert np.mean(amplitude > 1.5) == pytest.approx(0.05, abs=0.004)
 
 
+@pytest.mark.parametrize("effect", [PeriodicScale("x"), stated()], ids=["as physics allows", "as stated"])
+def test_errors_at_many_readings_are_those_at_each(effect: PeriodicScale) -> None:
+    """By polynomials in cells of the axis; at readings of the recording and in cells asked for later as well."""
+    random = np.random.default_rng(5)
+    recorded, many = random.uniform(-300.0, 500.0, 40), np.sort(random.uniform(-300.0, 500.0, 30_000))
+    into = random.standard_normal((40, 6))
+    one, other = GivenPeriod(effect, recorded, into), GivenPeriod(effect, recorded, into)
+    many[::1000] = recorded[:30]
+    largest = np.abs(other.at(recorded)).max(axis=0)
+    for readings in (many, random.uniform(400.0, 700.0, 1500)):
+        at = one.at(readings)
+        np.testing.assert_allclose(at[::50] / largest, other.at(readings[::50]) / largest, atol=2e-12)
+
+
 def test_the_covariance_is_the_sum_of_the_means_over_all_periods() -> None:
     """By numerical integration over the logarithm of the period."""
     effect, apart = stated(), np.array([0.0, 0.4, 3.0, 17.0, 300.0])
