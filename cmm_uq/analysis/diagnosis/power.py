@@ -222,10 +222,6 @@ class _Rule:
         visible, rivals = self.comparison.visible, enumerate(self.comparison.explanations)
         return next((i for i, e in rivals if e.name == name and e.kind == EFFECT and i in visible), None)
 
-    @cached_property
-    def _naming(self) -> Naming:
-        return Naming(self.comparison.explanations)
-
     def reached(self, tried: Sequence[tuple[Floats, Floats, int]], quantile: float) -> Iterator[tuple[Floats, Floats]]:
         """Sizes (d,) from which on recordings are alarmed, and named, of noise (m, d), a direction (m, 1) and its effect each.
 
@@ -237,12 +233,12 @@ class _Rule:
         count = tried[0][0].shape[1]
         direction, true = np.repeat(direction, count, axis=1), np.repeat([i for *_, i in tried], count)
         alarm, named = np.full((2, len(SIZES), len(true)), _UNASKED)
-        rest = np.arange(len(true))
+        rest, naming = np.arange(len(true)), Naming(self.comparison.explanations)
         for row in reversed(range(len(SIZES))):
             data = self.sigma * (noise[:, rest] + SIZES[row] * direction[:, rest])
             statistic, odds = statistic_of(self.comparison, data)
             alarm[row, rest] = statistic - self.threshold(data)
-            named[row, rest] = np.minimum(alarm[row, rest], self._naming(odds, true[rest]))
+            named[row, rest] = np.minimum(alarm[row, rest], naming(odds, true[rest]))
             alarmed = alarm[row].reshape(-1, count) > 0
             rest = np.flatnonzero(alarmed & (alarmed.sum(axis=1, keepdims=True) > np.ceil(quantile * (count - 1))))
             if not len(rest):

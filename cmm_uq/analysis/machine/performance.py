@@ -57,12 +57,11 @@ class MachinePerformance:
         if not self.of_bar:
             return {}
         parts = np.array_split(self.errors, 1 + self.errors.size // _AT_ONCE)
-        drawn, of_mean = [accuracy.figures(MICROMETRE * some) for some in parts], self.errors.mean(axis=0) * MICROMETRE
-        return {
-            name: _quantity(np.concatenate([one[name] for one in drawn]), float(mean), UNITS[name])
-            for name, mean in accuracy.figures(of_mean).items()
-            if name != "mean_length_mm"
-        }
+        drawn = [accuracy.figures(MICROMETRE * some) for some in parts]
+        of_mean = accuracy.figures(MICROMETRE * self.errors.mean(axis=0))
+        names = [name for name in UNITS if name != "mean_length_mm"]
+        each = {name: np.hstack([one[name] for one in drawn]) for name in names}
+        return {name: _quantity(each[name], float(of_mean[name]), UNITS[name]) for name in names}
 
     def of_statement(self, statement: Statement) -> tuple[float, Quantity] | None:
         """The largest of what a statement decides, µm: as recorded, and of the machine, of the same lengths without noise.

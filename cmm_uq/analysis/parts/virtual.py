@@ -322,8 +322,8 @@ class Virtual:
             return self._drawn(random, n)
         one, other = random.spawn(2)  # a stream for each half: the same numbers on any number of cores
         with ThreadPoolExecutor(1) as thread:
-            later = thread.submit(self._drawn, other, n - n // 2)
-            return np.concatenate([self._drawn(one, n // 2), later.result()])
+            half = thread.submit(self._drawn, other, n - n // 2)
+            return np.concatenate([self._drawn(one, n // 2), half.result()])
 
     def _drawn(self, random: np.random.Generator, n: int) -> Floats:
         counts = np.full(len(self.places), n // len(self.places))

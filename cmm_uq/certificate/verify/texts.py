@@ -22,7 +22,9 @@ def strict_json(content: bytes, where: str) -> dict[str, Any]:
     if len(content) > JSON_BYTES.most:
         raise refusal(f"is larger than {JSON_BYTES.most} bytes")
     text = text_of(content, where, _FIX)
-    if _depth(text) > JSON_DEPTH.most:
+    # brackets outside strings, before anything recurses
+    steps = (1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[{\]}]", _QUOTED.sub("", text)))
+    if max(accumulate(steps), default=0) > JSON_DEPTH.most:
         raise refusal(f"is nested deeper than {JSON_DEPTH.most} levels")
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -56,12 +58,6 @@ def canonical(data: Any) -> bytes:
 
 
 _QUOTED = re.compile(r'"(?:[^"\\]|\\.)*+"?', re.DOTALL)
-
-
-def _depth(text: str) -> int:
-    """Of brackets outside strings, before anything recurses."""
-    steps = (1 if bracket in "[{" else -1 for bracket in re.findall(r"[\[{\]}]", _QUOTED.sub("", text)))
-    return max(accumulate(steps), default=0)
 
 
 _MARK, _LINE, _OTHER_LINE = b"\xef\xbb\xbf", b"\n", b"\r\n"

@@ -55,7 +55,7 @@ ALLOWED = {POSITION: 20.0, STRAIGHTNESS: 50.0, ROTATION: 30.0}
 _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
 _AT_ONCE = 1_000_000  # covariances of readings, or displacements, that are held at once
 _MANY, _FEW = 20_000, 1000  # readings up to which the covariance is taken of each; up to which, where cells are known
-_PERIODS, _DEGREE = 8, 54  # shortest periods in a cell of an axis, and polynomials: off by 10⁻¹³ of the largest
+_PERIODS, _DEGREE = 8, 60  # shortest periods in a cell of an axis, and polynomials: off by 10⁻¹³ of the largest
 _LOOKED_AT = 61  # readings
 TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
 _EACH = 4  # of these in each band, where the size of an error goes by its period
@@ -217,15 +217,15 @@ class GivenPeriod(Effect):
         return np.hstack([_waves(reading, np.ravel(self.sum.at)), self._said(reading)])
 
     def _said(self, reading: Floats) -> Floats:
-        """At many readings by polynomials: the covariance has no wave that is shorter than the shortest period."""
+        """At many readings by polynomials in cells of the axis, for no wave is shorter than the shortest period."""
         if len(reading) <= (_FEW if self._cells else _MANY):
             parts = np.array_split(reading, 1 + len(reading) * len(self.readings) // _AT_ONCE)
             return np.concatenate([covariance(self.of, part, self.readings) @ self.into for part in parts])
-        length = _PERIODS * min(low for bands in _bands(self.of) for low, *_ in bands)
-        place, nodes = reading / length, np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
-        order, found = np.argsort(place), np.empty((len(reading), self.into.shape[1]))
-        each, begin = np.unique(np.floor(place[order]), return_index=True)
-        for cell, rows in zip(each.tolist(), np.split(order, begin[1:]), strict=True):
+        length = _PERIODS * float(np.min(self.sum.at))
+        place, found = reading / length, np.empty((len(reading), self.into.shape[1]))
+        order, nodes = np.argsort(place), np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
+        for rows in np.split(order, 1 + np.flatnonzero(np.diff(np.floor(place[order])))):
+            cell = float(np.floor(place[rows[0]]))
             if cell not in self._cells:
                 values = self._said((cell + 0.5 + 0.5 * nodes) * length)
                 self._cells[cell] = np.linalg.solve(chebvander(nodes, _DEGREE - 1), values)
@@ -261,19 +261,14 @@ def _waves(reading: Floats, periods: Floats) -> Floats:
     return MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
 
 
-def _bands(effect: PeriodicScale) -> Sequence[Sequence[tuple[float, float, float]]]:
-    """Of each error that it is the sum of: periods from, to, mm, and the standard deviation of sine and cosine, µm."""
-    (shape,), own = effect.shape, effect.coefficients[0].prior_sd
-    return effect.errors or (((shape.low, shape.high, own),),)
-
-
 def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
     """(n, p) mm², of an error whose period nobody knows, at readings (n,) and (p,), mm.
 
     The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀); where σ goes by λ, of each band by its part.
     """
+    (shape,), own = effect.shape, effect.coefficients[0].prior_sd
     distance, whole = 2 * np.pi * np.abs(np.subtract.outer(one, other)), np.zeros(())
-    for bands in _bands(effect):
+    for bands in effect.errors or (((shape.low, shape.high, own),),):
         same, every = distance < _SAME * bands[0][0], np.log(bands[-1][1] / bands[0][0])
         apart = np.where(same, 1.0, distance)
         for low, high, sd in bands:

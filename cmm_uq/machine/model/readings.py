@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -139,9 +140,7 @@ class AxisReading:
         if self.interpolation is not None:
             period, most = self.interpolation
             ends = np.geomspace(0.5 * period, period, _TURN + 1)
-            found.append(
-                tuple((low, high, most) for low, high in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
-            )
+            found.append(tuple((low, high, most) for low, high in pairwise(ends.tolist())))
         return tuple(found)
 
     @property

@@ -178,7 +178,10 @@ def cloud_blocks(source: Path, columns: Sequence[str] = DIGITIZER_COLUMNS, *, bl
     """Rows (b, k) of a cloud, b ≤ ``block``, one block after another."""
     for file in cloud_files(source):
         if source.suffix == ".parquet":
-            yield from _parquet_blocks(file, columns, block)
+            with _parquet_file(file) as opened:
+                _refuse_missing(columns, opened.schema_arrow.names, file)
+                for batch in opened.iter_batches(batch_size=block, columns=list(columns)):
+                    yield _numbers([batch.column(name) for name in columns], columns, file)
         elif source.suffix == ".csv":
             yield from csv_blocks(file, columns, block)
         else:
@@ -263,13 +266,6 @@ def _written_npy(path: Path, names: Sequence[str], mark: str) -> Iterator[Callab
         yield write
         file.seek(0)
         file.write(header())
-
-
-def _parquet_blocks(path: Path, columns: Sequence[str], block: int) -> Iterator[Floats]:
-    with _parquet_file(path) as file:
-        _refuse_missing(columns, file.schema_arrow.names, path)
-        for batch in file.iter_batches(batch_size=block, columns=list(columns)):
-            yield _numbers([batch.column(name) for name in columns], columns, path)
 
 
 def _refuse_missing(columns: Sequence[str], there: Sequence[str], path: Path) -> None:

@@ -64,7 +64,8 @@ class Superposition:
         """Errors e (n, 3), mm, of points as indicated, for coefficients (k,)."""
         arm = self._arm(points, coefficients)
         if arm is not None:
-            others = self._sum(About(points), np.where(self._of_rows, 0.0, coefficients))
+            of_rows = np.array([isinstance(effect, OfRows) for effect in self.effects for _ in effect.coefficients])
+            others = self._sum(About(points), np.where(of_rows, 0.0, coefficients))
             columns = points.columns
             return np.asarray(others + arm.posed(columns).tool - arm_of(points).posed(columns).tool, dtype=np.float64)
         squareness = self._squareness(points, coefficients)
@@ -136,12 +137,6 @@ class Superposition:
     def bends(self) -> bool:
         """Whether e is linear in the coefficients about a place of theirs only: changes of an arm's rows."""
         return any(isinstance(effect, OfRows) for effect in self.effects)
-
-    @property
-    def _of_rows(self) -> NDArray[np.bool_]:
-        return np.array(
-            [isinstance(effect, OfRows) for effect in self.effects for _ in effect.coefficients], dtype=bool
-        )
 
     @property
     def leaning(self) -> list[tuple[int, Effect]]:

@@ -154,9 +154,7 @@ class SigmaIntegral:
         whole = np.concatenate([square, every], axis=2)
         if self.table is not None or not self.degrees:
             left = np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ whole
-            left = self(left)
-            left += constant[..., None]
-            return log_sum_in(left, axes)
+            return log_sum_in(np.add(self(left), constant[..., None], out=left), axes)
         half, most = 0.5 * self.degrees, float(constant.max())
         factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
         left = np.concatenate([-factor * gain, factor], axis=3) @ whole
@@ -199,7 +197,7 @@ class Precision:
     def __call__(self, columns: Floats) -> Floats:
         """Precision times columns (m, b)."""
         if self._diagonal is None:
-            whole = self._transposed @ (self.whitening @ columns)
+            whole = self.whitening.T @ (self.whitening @ columns)
         else:
             whole = self._diagonal * (self._diagonal * columns)
         return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
@@ -215,10 +213,6 @@ class Precision:
         if self.whitening.nnz != len(each) or not np.array_equal(self.whitening.indices, each):
             return None
         return self.whitening.diagonal()[:, None]
-
-    @cached_property
-    def _transposed(self) -> scipy.sparse.csc_array:
-        return self.whitening.T
 
 
 def precisions(kinds: Sequence[NoiseKind], reached: Floats, certified: Floats) -> list[Precision]:

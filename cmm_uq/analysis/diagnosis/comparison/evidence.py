@@ -272,8 +272,7 @@ class CandidateComparison:
             kinds = len(known.squares)
             if kept:
                 columns = some.where
-                shape = kinds, columns.stop - columns.start, known.width
-                found = np.zeros(shape)
+                found = np.zeros((kinds, columns.stop - columns.start, known.width))
                 found[:, :, :1] = self._left_with_all[:, columns]
                 for basis, factor in known.made_of or ():
                     found += self._given.products(basis)[:, columns] @ factor

@@ -88,15 +88,6 @@ def _winding(points: Points, axis: str, _: str, __: Sequence[float]) -> Floats:
     return along(axis, 0.5 * MICROMETRE * points.column(f"approach_{axis}") * place)
 
 
-def _lagging(points: Points, axis: str, _: str, __: Sequence[float]) -> Floats:
-    return along(axis, _MILLISECOND * points.column("speed_mm_s") * travel(points)[:, AXES.index(axis)])
-
-
-def _path(points: Points, axis: str, _: str, __: Sequence[float]) -> Floats:
-    change = index_change(points)
-    return along(axis, change[0] - change)
-
-
 _APPROACH = ("approach_{a}",)
 HYSTERESIS, DRIFT, PLAY, YAW_PLAY, WIND_UP, SPEED_LAG, SCALE_CURVATURE, AIR_SCALE, DEAD_PATH = (
     Law("hysteresis", "Different readings from either side", say("Hysteresis of {axis}"), "e_a = ½·gap·approach_a", "drive",
@@ -135,7 +126,8 @@ HYSTERESIS, DRIFT, PLAY, YAW_PLAY, WIND_UP, SPEED_LAG, SCALE_CURVATURE, AIR_SCAL
     Law("speed_lag", "Scale and trigger read at different moments", say("Lag of {axis} in proportion to speed"),
         "e_a = lag·speed along a, in the sense of travel", "controller",
         say("the scale of {axis} and the trigger are read at different moments: check how the controller latches this scale, "
-            "and probe more slowly until then"), (Parameter("lag_ms", unit("ms"), 1.0),), _lagging,
+            "and probe more slowly until then"), (Parameter("lag_ms", unit("ms"), 1.0),),
+        lambda p, a, b, s: along(a, _MILLISECOND * p.column("speed_mm_s") * travel(p)[:, AXES.index(a)]),
         ("speed_mm_s", *(f"approach_{a}" for a in AXES)), FURTHER, along_motion=True),
     # a scale clamped at both ends, a tape that is stretched unevenly, a rack of two pieces
     Law("scale_curvature", "Position error of second order, over the travel T from a0",
@@ -154,7 +146,8 @@ HYSTERESIS, DRIFT, PLAY, YAW_PLAY, WIND_UP, SPEED_LAG, SCALE_CURVATURE, AIR_SCAL
     Law("dead_path", "Dead path of a laser scale: the path d that the zero of the scale leaves out",
         say("Dead path of the laser scale of {axis}"), "e_a = −d·(n − n at the first point)", "scale",
         say("the dead path of the laser of {axis} is not compensated: enter it in the compensation, or zero the axis close "
-            "to the interferometer"), (Parameter("path_mm", unit("mm"), 300.0),), _path, AIR, FURTHER, along_motion=True),
+            "to the interferometer"), (Parameter("path_mm", unit("mm"), 300.0),),
+        lambda p, a, b, s: along(a, (change := index_change(p))[0] - change), AIR, FURTHER, along_motion=True),
 )  # fmt: skip
 CURVATURE = SCALE_CURVATURE.each(AXES)
 EFFECTS: tuple[Effect, ...] = (
