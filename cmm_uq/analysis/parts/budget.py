@@ -160,23 +160,22 @@ def variance_shares(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Vari
     # the second sample stands in other places, so that nothing of it is that of the first
     elsewhere = [places[i] for i in random.permutation(len(places))]
     several = [cause for cause in causes if len(set(cause.factors)) > 1]
-    drawn, found = [list[Drawn]() for _ in several], list[list[Floats]]()
-    for part in in_parts(virtual.plan, each):
+    drawn = [list[Drawn]() for _ in several]
+
+    def sampled(part: int) -> list[Floats]:
         A = [place.drawn(random, part) for place in places]
         B = [place.drawn(random, part) for place in places]
         exchanged = (
             [[b if line_of(cause) == line else a for a, b, cause in zip(*own, causes, strict=True)]
              for own in zip(A, B, strict=True)] for line in lines
         )  # fmt: skip
-        of_place = [_errors(elsewhere, A, virtual.exact)] if len(places) > 1 else []
-        found.append([
-            _errors(places, A, virtual.exact), _errors(elsewhere, B, virtual.exact),
-            *(_errors(places, mixed, virtual.exact) for mixed in exchanged), *of_place,
-        ])  # fmt: skip
         by_cause = zip(causes, zip(*A, strict=True), strict=True)
         for whole, own in zip(drawn, (own for cause, own in by_cause if cause in several), strict=True):
             whole += own
-    yA, yB, *mixed = (np.concatenate(each) for each in zip(*found, strict=True))
+        samples = ((places, A), (elsewhere, B), *((places, mixed) for mixed in exchanged), (elsewhere, A))
+        return [_errors(*each, virtual.exact) for each in samples[: None if len(places) > 1 else -1]]
+
+    yA, yB, *mixed = map(np.concatenate, zip(*map(sampled, in_parts(virtual.plan, each)), strict=True))
     both = np.vstack([yA, yB])
     variance = np.maximum(both.var(axis=0), np.finfo(np.float64).tiny)
     centred = yB - both.mean(axis=0)
