@@ -228,7 +228,7 @@ class GivenPeriod(Effect):
             cell = float(np.floor(place[rows[0]]))
             if cell not in self._cells:
                 values = self._said((cell + 0.5 + 0.5 * nodes) * length)
-                self._cells[cell] = np.linalg.solve(chebvander(nodes, _DEGREE - 1), values)
+                self._cells[cell] = np.asarray(np.linalg.inv(chebvander(nodes, _DEGREE - 1)) @ values, dtype=np.float64)
             found[rows] = chebvander(2 * (place[rows] - cell) - 1, _DEGREE - 1) @ self._cells[cell]
         return found
 
