@@ -122,6 +122,18 @@ def test_a_ring_of_unknown_diameter_hides_the_error_of_the_stylus_radius() -> No
     )
 
 
+def test_play_of_both_axes_is_told_from_the_radius_by_four_and_six_lobes() -> None:
+    """By hand: of a gap g along X the surface is indicated g/2·|cos θ| too far in: mean 2/π, four lobes 4/15π."""
+    points = rings(places=1, count=48)
+    points = with_columns(points, **{f"approach_{a}": -np.sign(np.round(points.columns[f"n{a}"], 9)) for a in "xyz"})
+    names, truth = ["probe_radius", "hysteresis_x", "hysteresis_y"], [4.0, 6.0, -3.0]
+    seen = indicated(RING, points, names, truth)
+    assert estimated(RING, seen, names).value[:3] == pytest.approx(truth, abs=1e-6)
+    forms, lobes = RingGauge(RING, indicated(RING, points, ["hysteresis_x"], [6.0])).probed
+    assert forms.size == pytest.approx([-2 * 3e-3 * 2 / np.pi], rel=2e-3)
+    assert 1e3 * lobes[0, 4] == pytest.approx(3.0 * 4 / (15 * np.pi), rel=0.02)
+
+
 def test_sections_have_no_tilt_and_several_heights_have_one() -> None:
     """24 points less two of a section or four of an axis, the certified diameter and no effects; in each of three places."""
     exact = artefact_facts(kind="ring", length_mm=50.0)

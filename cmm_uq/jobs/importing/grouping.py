@@ -251,9 +251,9 @@ def on_a_plate(xyz: Floats) -> bool:
 
 
 def _on_a_ball(xyz: Floats) -> bool:
-    """Whether places (n, 3) are points probed on one ball or ring: more than enough of them, all round, within a few µm."""
+    """Whether places (n, 3) are points probed on one ball: more than enough of them, all round, within a few micrometres."""
     about = xyz - xyz.mean(axis=0)
-    if len(xyz) < _PROBED or np.linalg.svd(about, compute_uv=False)[1] < _ROUND * np.linalg.norm(about):
+    if len(xyz) < _PROBED or np.linalg.svd(about, compute_uv=False)[2] < _ROUND * np.linalg.norm(about):
         return False
     sides = np.column_stack([2 * about, np.ones(len(xyz))])
     centre = np.linalg.lstsq(sides, np.sum(about**2, axis=1), rcond=None)[0][:3]

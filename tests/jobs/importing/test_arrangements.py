@@ -132,6 +132,16 @@ def test_a_ring_is_one_measurement() -> None:
     assert groups(read(["Name;X;Y;Z", *named], unit="mm")) == [1] * 9
 
 
+def test_points_probed_around_a_setting_ring_need_no_names() -> None:
+    """Sixteen points of a ring of 50 mm, nothing beside their coordinates; 10 µm out of round."""
+    angles = 2 * np.pi * (np.arange(16) + 0.5) / 16
+    radii = 25.0 + 5e-3 * np.cos(2 * angles)
+    rows = [
+        f"{300 + r * np.cos(a):.4f};{200 + r * np.sin(a):.4f};-100.0000" for r, a in zip(radii, angles, strict=True)
+    ]
+    assert groups(read(["X;Y;Z", *rows], unit="mm")) == [1] * 16
+
+
 def test_a_beam_measured_twice_in_turn() -> None:
     ways = ((1, 0), (0.6, 0.8))
     rows = [f"{100 + k * 100 * c:.4f};{200 + k * 100 * s:.4f};{-100 - 20 * s:.4f}" for c, s in ways for k in range(5)]
