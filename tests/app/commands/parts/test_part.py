@@ -249,6 +249,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
         "machine.passed[]",
         "machine.axes[]",
         "machine.further[]",
+        "machine.against[]",
         "other_methods.",
         "reported.",
         "decision.withheld",
