@@ -110,7 +110,8 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     family = [name for name in family if "_" not in name.removeprefix(f"{word}_")] or family
     if 1 < len(family) <= _FAMILY:
         return f"Did you mean {', '.join(map(repr, family))}?"
-    near = get_close_matches(word, names, n=1, cutoff=0.6) if len(word) <= _COMPARED else []
+    editions = [name for name in names if name.startswith(f"{word}:")]
+    near = editions[-1:] or (get_close_matches(word, names, n=1, cutoff=0.6) if len(word) <= _COMPARED else [])
     if near:
         return f"Did you mean {near[0]!r}?"
     listed = ", ".join(names)

@@ -14,6 +14,7 @@ import datetime as dt
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from itertools import chain
@@ -28,7 +29,7 @@ from cmm_uq.base.messages import Message, Plural, Text, Verbatim, commas, say, s
 from cmm_uq.certificate import document as doc
 from cmm_uq.certificate.document import WORDS, Document, Facts, Plot, Section, Table, letters
 from cmm_uq.certificate.look import COLOURS, template_folder
-from cmm_uq.certificate.plots.style import JAPANESE, fonts_of
+from cmm_uq.certificate.plots.style import JAPANESE, fonts_of, japanese_font
 from cmm_uq.certificate.sign import TEST_NOTE, Seal, Signer
 
 if TYPE_CHECKING:
@@ -258,12 +259,12 @@ def _attachment(place: int, name: str, language: Code) -> dict[str, Any]:
 
 
 def _with_fallback(content: dict[str, Any], language: Code, **how: Any) -> bytes:
-    """Compile with the embedded fonts; then with the machine's too; then without the characters that both lack."""
+    """Compile with the embedded fonts; with that of Japanese documents too; with the machine's; without what all lack."""
     from typst import TypstError
 
     folders, missing = [str(file.parent) for file in fonts_of(language)], list[str]()
     content = {**content, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
-    for system_fonts in (False, True, True):
+    for system_fonts in (False, False, True, True):
         try:
             shown = _without(content, missing) if missing else content
             return _compile(shown, folders, system_fonts=system_fonts, **how)
@@ -277,6 +278,8 @@ def _with_fallback(content: dict[str, Any], language: Code, **how: Any) -> bytes
                 fix = "The HTML view has the same content; please report this with the job that caused it"
                 raise CmmUqError(f"the PDF could not be made: {error.message}{hints}", fix=fix) from error
             missing = lacking if system_fonts else []
+            with suppress(CmmUqError):
+                folders, content["fonts"] = [str(japanese_font().parent)], [FACE, JAPANESE]
     raise AssertionError("unreachable")
 
 

@@ -76,6 +76,7 @@ def test_a_list_of_known_names_never_exceeds_what_fits() -> None:
 def test_short_lists_and_near_names_are_told_as_before() -> None:
     assert suggestion("zzz", ["b", "a"]) == "Known: a, b"
     assert suggestion("lenght_mm", ["length_mm", "u_um"]) == "Did you mean 'length_mm'?"
+    assert suggestion("ISO 10360-2", ["ISO 10360-12:2016", "ISO 10360-2:2009"]) == "Did you mean 'ISO 10360-2:2009'?"
     assert suggestion("k" * 100_000, ["length_mm"]) == "Known: length_mm"
 
 

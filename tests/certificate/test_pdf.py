@@ -192,6 +192,12 @@ def test_a_character_that_no_font_has_is_shown_as_a_box_and_named() -> None:
     assert "□ stands for a character that the fonts of this file lack: U+0378." in text
 
 
+def test_a_japanese_name_in_an_english_document_is_set_in_the_font_of_japanese_ones() -> None:
+    text = "".join(pages(render_pdf(document_of("東京測定 検査課"), {}))).replace(" ", "")
+    assert "東京測定検査課" in text
+    assert "□" not in text
+
+
 def test_a_plot_that_is_no_svg_is_said_clearly(certificate: Document) -> None:
     broken = replace(certificate, sections=(Section("One", (Plot("c", "a", "<svg"),)),))
     with pytest.raises(CmmUqError, match="the PDF could not be made: "):

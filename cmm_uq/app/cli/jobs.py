@@ -111,9 +111,8 @@ def _tables(machine: str, serial: str, settings: list[str]) -> dict[str, dict[st
         for other in tables.setdefault(table, {}):
             if other.startswith(f"{key}.") or key.startswith(f"{other}."):
                 within, whole = sorted((f"{table}.{key}", f"{table}.{other}"), key=len, reverse=True)
-                raise CmmUqError(
-                    f"{whole} has a value, and {within} lies within it", where="--set", fix="Give one of them"
-                )
+                said = f"{whole} has a value, and {within} lies within it"
+                raise CmmUqError(said, where="--set", fix="Give one of them")
         tables[table][key] = value_of(text.strip())
     return tables
 
@@ -131,7 +130,8 @@ def _in_settings(tables: Mapping[str, Mapping[str, Any]]) -> Iterator[None]:
             if place := _IN_JOB.fullmatch(each.where or ""):
                 key = ".".join(filter(None, place.groups()))
                 each.where = f"--set {key}" if place[1] in tables else key
-                each.fix = (each.fix or "").replace("Add it to job.toml", f"Give --set {key}=…")
+                quoted, fix = f"Write --set '{key}=\"…\"': a shell takes other quotes away", each.fix or ""
+                each.fix = fix.replace("Put it in quotes", quoted).replace("Add it to job.toml", f"Give --set {key}=…")
                 each.args = (str(each),)
         if error.also:  # the command tells the first alone
             others = "; ".join(one.fix or one.problem for one in error.also)

@@ -220,8 +220,12 @@ def _meant(word: str, table: type[BaseModel] | None) -> str:
     if converted := conversion(word, known):
         return converted
     meant = suggestion(word, known)
-    match = _ONE_MEANT.fullmatch(meant)
-    return f"{meant}{_explained(match[1], table)}" if match else meant
+    if (match := _ONE_MEANT.fullmatch(meant)) is not None:
+        return f"{meant}{_explained(match[1], table)}"
+    noun, _, last = word.partition("_")  # as of a diameter, which another key states
+    told = sentences(table).items() if table is not None and last and len(noun) > len("mass") else ()
+    named = [key for key, sentence in told if key.endswith(f"_{last}") and noun in sentence.casefold()]
+    return f"Did you mean {named[0]!r}?{_explained(named[0], table)}" if len(named) == 1 else meant
 
 
 def _explained(key: str, table: type[BaseModel] | None) -> str:

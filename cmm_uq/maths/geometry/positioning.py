@@ -32,6 +32,7 @@ from cmm_uq.base.points import Floats, Ints
 UP, DOWN = 0, 1
 _SAME_MM = 1e-2  # targets nearer than this are one
 _ON_IT = 1e-6  # mm from a target, within which a reading is at it
+_ROUNDING = 1e-12  # of figures, by which the order of sums moves them
 # of the least distance of targets, that readings in motion may be apart: of the shortest wave that targets resolve, twice
 # that distance, a straight line then leaves out (π/20)²/2 of its amplitude at most, 1.2 %
 LARGEST_GAP = 0.1
@@ -169,7 +170,11 @@ class PositioningRuns:
         at = self._figures(self.x[None])
         more, varies = (self._figures(self.x + common + n * each) - at for n in (np.sqrt(3), 1.0))
         added = np.maximum(np.abs(more.mean(axis=0)), np.abs(at[0] - self._without(each)))
-        return dict(zip(self.names(), np.hypot(added, varies.std(axis=0)).tolist(), strict=True))
+        u = np.hypot(added, varies.std(axis=0))
+        u[u < _ROUNDING * max(np.abs(part).max() for part in (at, more, varies))] = (
+            0.0  # a change that readings share leaves ranges of them as they are
+        )
+        return dict(zip(self.names(), u.tolist(), strict=True))
 
     def _without(self, each: Floats) -> Floats:
         """Figures without scatter as large as ``each``, where neighbours say what that is; else as they are."""

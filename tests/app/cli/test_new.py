@@ -24,6 +24,14 @@ from tests.app.cli.process import run
 from tests.conftest import ROOT
 
 
+def test_a_key_that_means_another_and_a_text_without_quotes_are_explained(tmp_path: Path) -> None:
+    said = run("new", "sphere", "--machine", "M", "--set", "artefact.diameter_mm=25", cwd=tmp_path).stderr
+    assert "Did you mean 'length_mm'? Certified length at 20 °C, of a sphere its diameter" in said
+    said = run("new", "sphere", "--machine", "M", "--set", "artefact.serial=2217", cwd=tmp_path).stderr
+    assert """Write --set 'artefact.serial="…"': a shell takes other quotes away""" in said
+    assert not (tmp_path / "sphere").exists()
+
+
 def test_it_lists_the_kinds_and_begins_one_in_a_folder_of_its_name(tmp_path: Path) -> None:
     listed = run("new", cwd=tmp_path)
     assert listed.returncode == 0
