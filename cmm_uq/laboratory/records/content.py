@@ -56,7 +56,7 @@ def certificate_content(
             "values": values(data, named), "covariance": covariance(data), **({"missing": missing} if missing else {}),
             **({KEY: head.data} if head else {}),
         }  # fmt: skip
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         raise CmmUqError(f"is no results.json of a job: {error!r}", where=folder) from error
 
 

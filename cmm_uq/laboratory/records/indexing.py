@@ -75,14 +75,20 @@ class Indexer:
                 self._adjustment(self._machine(data["machine"], "", entry.number), data["day"], entry.number)
             elif entry.kind in ("release", "withdrawal", "replacement"):
                 self._signature(entry, data)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise CmmUqError(f"cannot be recorded as {entry.kind}: {error!r} is missing or no such thing",
                              where=f"entry {entry.number}") from error  # fmt: skip
 
     def flush(self) -> None:
         for table, rows in self._rows.items():
             if rows:
-                self.connection.execute(insert(table), rows)
+                try:
+                    self.connection.execute(insert(table), rows)
+                except OverflowError as error:  # SQLite takes no integer of more than 64 bits
+                    fix = "cmm-uq records verify says which entry"
+                    raise CmmUqError(
+                        "a number in an entry is too large", where=f"table {table.name}", fix=fix
+                    ) from error
                 self._rows[table] = []
         self._certificates.clear()
 

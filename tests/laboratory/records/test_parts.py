@@ -14,6 +14,7 @@ from cmm_uq.app.commands.laboratory.due import history_of, what_is_due
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.backup import migrate
+from cmm_uq.laboratory.records.content import certificate_content
 from cmm_uq.laboratory.records.listing import standing_of_all
 from cmm_uq.laboratory.records.store import New, Records
 from tests.laboratory.records.histories import certificate, moment
@@ -92,3 +93,15 @@ def test_history_lists_recorded_parts_and_those_in_doubt_by_their_entries(tmp_pa
     found = history_of("1102", tmp_path / "records.db", on=dt.date(2024, 7, 1))
     assert [(one.day, one.entry, one.certificate) for one in found.parts] == [(JUNE, 9, "K-1")]
     assert [[one.entry for one in period.parts] for period in found.doubtful] == [[9]]
+
+
+@pytest.mark.parametrize(
+    "changes", [{"folder": 2**70}, {"machine": {"serial": 2**70}, "artefact": {"due": 2**70, "name": "A"}}]
+)
+def test_a_number_that_no_database_holds_is_refused_in_words(tmp_path: Path, changes: dict[str, Any]) -> None:
+    with open_records(tmp_path / "records.db", create=True) as records, pytest.raises(CmmUqError, match="too large"):
+        records.append_all([("report", certificate(**changes), moment(MARCH))])
+    matrix = {"parameters": ["a"], "units": ["mm"], "matrix": [""]}
+    data = {"job": {"id": "j", "origin": "measured", "date": "2024-01-01", "machine": "M"}, "covariance": matrix}
+    with pytest.raises(CmmUqError, match=r"is no results\.json of a job"):
+        certificate_content(data, None, command="report", folder="", results_sha256="", files={}, named=str)
