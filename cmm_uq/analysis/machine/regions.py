@@ -275,11 +275,11 @@ def factor_regions(
     def within(change: Floats) -> Floats:
         return np.asarray(ours + others @ change[same].T)
 
-    of_recording, performance = drawn.of_recording(model, posterior), drawn.performance(model)
+    of_recording = drawn.of_recording(model, posterior)
     doubted = partial(drawn.doubted, model, named)
     over_all, parts = doubted(within(whole)), np.stack([doubted(within(one)) for one in eighths])
     low, high = np.quantile(parts.min(axis=0), 0.025, axis=0), np.quantile(parts.max(axis=0), 0.975, axis=0)
-    recorded = of_recording.factors
+    recorded, performance = of_recording.factors, drawn.performance(model)  # all readings at once come first
     quantities = [Quantity.of_draws(each, of) for each, of in zip(over_all.T, units, strict=True)]
     of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
     scales = dict(zip(field.field.families, sizes.families.T, strict=True))
