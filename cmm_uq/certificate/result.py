@@ -238,8 +238,7 @@ class Result:
 
     @cached_property
     def undetermined(self) -> tuple[tuple[tuple[str, str], ...], ...]:
-        keys, free = [unknown.key for unknown in self.least_squares.unknowns], self.least_squares.null_space.T
-        return tuple(tuple(key for key, part in zip(keys, column, strict=True) if part) for column in free)
+        return tuple(tuple(parts) for parts in self.least_squares.free)
 
     @cached_property
     def not_given(self) -> frozenset[tuple[str, str]]:
@@ -269,10 +268,12 @@ class Result:
         return frozenset(effect for effect, _ in self.not_given)
 
     def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[ParameterDifference, ...]:
-        """Of parameters in one unit that the recording leaves free together; U not below the laboratory's capability."""
+        """Of parameters in one unit that change by as much together; U not below the laboratory's capability."""
+        part = self.least_squares.free[self.undetermined.index(combination)]
         columns = {unknown.key: (i, unknown.unit) for i, unknown in enumerate(self.posterior.unknowns)}
         unit, stating, each = columns[combination[0]][1], StatedUncertainty.of(self.job), np.eye(len(columns))
-        alike, found = [key for key in combination if columns[key][1] == unit], []
+        as_much = [key for key in combination if np.isclose(part[key], part[combination[0]], rtol=1e-3)]
+        alike, found = [key for key in as_much if columns[key][1] == unit], []
         for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
             one, other = columns[second][0], columns[first][0]
             quantity = Quantity.of_draws(self.values[:, one] - self.values[:, other], unit)
@@ -365,9 +366,8 @@ class Outcome:
     @property
     def provenance(self) -> Mapping[str, Any]:
         """``software`` with plugins, ``job`` with the hashes of its inputs, and ``seed`` where a posterior was sampled."""
-        sampling = self.results.get("sampling", {})
         of_results = {key: self.results[key] for key in ("software", "job") if key in self.results}
-        return of_results | {key: sampling[key] for key in ("seed",) if key in sampling}
+        return of_results | {key: at for key, at in self.results.get("sampling", {}).items() if key == "seed"}
 
 
 @dataclass(frozen=True)

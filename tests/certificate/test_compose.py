@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pypdf import PdfReader
 
@@ -135,6 +136,19 @@ def test_free_scales_are_not_given_figures_but_their_differences_are(uncalibrate
     assert differences[0][0] == "Scale error of Y − Scale error of X"
     assert float(differences[0][2]) < 60
     assert any("Not determined by this recording" in text for text in document.warnings)
+
+
+def test_of_parameters_that_change_by_unequal_amounts_no_difference_is_determined(uncalibrated: Result) -> None:
+    """As of two squarenesses of which space diagonals see a weighted sum: 1.43 of the one and 1 of the other."""
+    least_squares = uncalibrated.least_squares
+    free = least_squares.null_space.copy()
+    free[np.flatnonzero(free[:, 0])[1]] *= -1.43
+    estimate = replace(uncalibrated.estimate, least_squares=replace(least_squares, null_space=free))
+    found = replace(uncalibrated, estimate=estimate)
+    ((combination,), kept) = found.undetermined, uncalibrated.differences(uncalibrated.undetermined[0])
+    left = [(one.first, one.second) for one in found.differences(combination)]
+    assert left == [(one.first, one.second) for one in kept if combination[1] not in (one.first, one.second)]
+    assert len(left) < len(kept)
 
 
 def test_a_run_that_did_not_converge_says_so_first(result: Result) -> None:

@@ -309,15 +309,14 @@ def _least_squares(ls: LeastSquares) -> dict[str, Any]:
 
 def _identifiability(result: Result) -> dict[str, Any]:
     ls = result.least_squares
-    names = [".".join(u.key) for u in ls.unknowns]
-    free = [{name: float(part) for name, part in zip(names, column, strict=True) if part} for column in ls.null_space.T]
+    free = [{".".join(key): part for key, part in parts.items()} for parts in ls.free]
     denied = (*result.left_to_prior, *(one.key for one in result.contradictions), *result.denied)
     return {
         "parameters": int(ls.rank + ls.null_space.shape[1]),
         "rank": ls.rank,
         "condition_number": ls.condition if np.isfinite(ls.condition) else None,
         "undetermined": free + [{".".join(key): 1.0} for key in denied],
-        "prior_share": {name: result.prior_share(u.key) for name, u in zip(names, ls.unknowns, strict=True)},
+        "prior_share": {".".join(u.key): result.prior_share(u.key) for u in ls.unknowns},
     }
 
 

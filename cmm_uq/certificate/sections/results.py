@@ -75,18 +75,25 @@ def reported(result: Result) -> Iterator[tuple[tuple[str, str], Quantity]]:
 
 def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) -> list[Block]:
     """A combination that no such recording determines, and the differences inside it that this one does."""
-    words = doc.Paragraph(say(
-        "{titles} can change together without changing any observation: the recording does not "
-        "determine their common part. A certified length of the artefact would.",
-        titles=listed([wording.title_of(key, result) for key in combination]),
-    ))  # fmt: skip
+    titles = listed([wording.title_of(key, result) for key in combination])
+    differences = result.differences(combination)
+    words = say(
+        "{titles} can change without changing any observation: the recording determines none of it by itself.",
+        titles=titles,
+    )
+    if differences:
+        words = say(
+            "{titles} can change together without changing any observation: the recording does not "
+            "determine their common part. A certified length of the artefact would.", titles=titles,
+        )  # fmt: skip
     named = [
         (say("{second} − {first}", second=wording.title_of(one.second, result), first=wording.title_of(one.first, result)),
          one.quantity)
-        for one in result.differences(combination)
+        for one in differences
     ]  # fmt: skip
     caption = say("Differences that are determined")
-    return [words, *([stated_table(caption, named, what=say("Difference"), value=say("Estimate"))] if named else [])]
+    stated = [stated_table(caption, named, what=say("Difference"), value=say("Estimate"))] if named else []
+    return [doc.Paragraph(words), *stated]
 
 
 Left = tuple[str, str, Text, Quantity]  # group and name of a quantity in results.json, its title, and what it is now.

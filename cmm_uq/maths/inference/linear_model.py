@@ -241,6 +241,13 @@ class LeastSquares:
     sigma_of_residuals: float  # mm, the same from the residuals alone; that in use where no degrees of freedom are left
     spread: Floats  # (k,) standard deviation that the noise gives to ``value``, of undetermined parameters too
 
+    @property
+    def free(self) -> list[dict[tuple[str, str], float]]:
+        """Parts by key of each combination that leaves all observations as they are."""
+        keys = [unknown.key for unknown in self.unknowns]
+        each = (zip(keys, column.tolist(), strict=True) for column in self.null_space.T)
+        return [{key: part for key, part in column if part} for column in each]
+
 
 def solve(model: LinearModel, most: int | None = None) -> LeastSquares:
     """Least-squares estimate; certified parameters are held, physical priors are not used.
