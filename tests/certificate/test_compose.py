@@ -146,8 +146,8 @@ def test_of_parameters_that_change_by_unequal_amounts_no_difference_is_determine
     estimate = replace(uncalibrated.estimate, least_squares=replace(least_squares, null_space=free))
     found = replace(uncalibrated, estimate=estimate)
     ((combination,), kept) = found.undetermined, uncalibrated.differences(uncalibrated.undetermined[0])
-    left = [(one.first, one.second) for one in found.differences(combination)]
-    assert left == [(one.first, one.second) for one in kept if combination[1] not in (one.first, one.second)]
+    left = [{one.first, one.second} for one in found.differences(combination)]
+    assert left == [{one.first, one.second} for one in kept if combination[1] not in (one.first, one.second)]
     assert len(left) < len(kept)
 
 
