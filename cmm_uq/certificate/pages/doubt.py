@@ -18,7 +18,7 @@ NOTE = say(
     "was so again: those that are recorded, and those of other reports beside the records or in the folders that are named."
 )
 _CERTIFICATE = say("Certificate of the machine")
-HEADS = (say("Date"), say("Number"), say("Part"), say("Serial number"), _CERTIFICATE, say("Decision"), say("Folder"))
+HEADS = (say("Date"), say("No."), say("Part"), say("Serial number"), _CERTIFICATE, say("Decision"), say("Folder"))
 LISTED = 100  # parts that are listed; the data have all
 
 

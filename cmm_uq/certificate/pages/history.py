@@ -348,7 +348,7 @@ def overview_of(history: MachineHistory) -> doc.Overview:
 
 def _certificates(history: MachineHistory) -> doc.Table | None:
     adjusted = say("Adjusted before")
-    heads = (say("Date"), say("Number"), say("What"), say("State"), say("Artefact"), say("Decision"), adjusted)
+    heads = (say("Date"), say("No."), say("What"), say("State"), say("Artefact"), say("Decision"), adjusted)
     rows = (
         (
             day(one.day), Verbatim(one.number), say("interim check") if one.interim else say("certificate"),
