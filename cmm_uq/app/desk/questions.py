@@ -112,7 +112,7 @@ def fields(kind: str) -> list[dict[str, str]]:
         label = _LABELS.get(dotted) or f"{said}{unit}" or dotted
         if dotted.startswith("machine.travel_mm."):
             label = f"Travel of {dotted[-1].upper()}, lowest to highest reading, mm"
-        example = " to ".join(f"{one:g}" for one in value) if isinstance(value, list) else str(value)
+        example = _as_toml(value) if isinstance(value, dict) else _shown(value, dotted)
         sort = "date" if dotted == "job.date" else "text"
         found.append({"key": dotted, "label": label, "example": example, "sort": sort, "further": ""})
     for dotted, label in _OF_CERTIFICATE.items():
@@ -239,7 +239,7 @@ def facts(text: str) -> dict[str, Any]:
         asked = fields(str(data["artefact"]["kind"]))
     except (tomllib.TOMLDecodeError, KeyError, TypeError, RecursionError):
         raise CmmUqError("names no kind of measurement", where="job.toml", fix="Mend it in its text") from None
-    return {"fields": asked, "values": {one["key"]: _shown(_stated(data, one["key"])) for one in asked}}
+    return {"fields": asked, "values": {one["key"]: _shown(_stated(data, one["key"]), one["key"]) for one in asked}}
 
 
 def _stated(data: Any, dotted: str) -> Any:
@@ -250,18 +250,21 @@ def _stated(data: Any, dotted: str) -> Any:
     return data
 
 
-def _shown(value: Any) -> str:
+def _shown(value: Any, dotted: str) -> str:
+    """A value as a field has it, and as it is read there; a table is none."""
     if isinstance(value, list):
-        return " to ".join(map(_shown, value))
+        return " to ".join(f"{one:.12g}" for one in value) if dotted in _PAIRS else _as_toml(value)
     if isinstance(value, float):
         return f"{value:.12g}"
-    return (
-        ""
-        if value is None or isinstance(value, dict)
-        else value.isoformat()
-        if isinstance(value, dt.date)
-        else str(value)
-    )
+    if isinstance(value, dict):
+        return ""
+    return "" if value is None else value.isoformat() if isinstance(value, dt.date) else str(value)
+
+
+def _as_toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_as_toml(one)}" for key, one in value.items()) + " }"
+    return f"[{', '.join(map(_as_toml, value))}]" if isinstance(value, list) else json.dumps(value, ensure_ascii=False)
 
 
 def with_facts(text: str, values: Mapping[str, str]) -> str:

@@ -194,13 +194,13 @@ class SheetReading:
     ) -> None:
         """What stands beside the columns that are taken: labels, and such as temperatures and directions of approach."""
         used = {c.i for own in self.taken.values() for c in own} | {*more}
+        called = {c.i: grid.named(c.i, c.path) or understood(c.heading).column or "" for c in columns}
         for c in columns:
-            name = understood(c.heading).column or ""
-            sort = sort_of(name)
+            name, sort = called[c.i], sort_of(called[c.i])
             if c.i not in used and name in _FURTHER and c.full and not (sort and c.unit and sort[0] != c.unit.sort):
                 self.further[name] = converted(c.values, c.unit, name) if c.unit and sort else c.values
         self.beside = _beside(grid, rows, used | {c.i for c in columns if c.role == "deviation" and c.minute})
-        names = ((c.i, c.heading) for c in columns if understood(c.heading).column not in self.further)
+        names = ((c.i, c.heading) for c in columns if called[c.i] not in self.further)
         self.unused = [name for i, name in names if i not in used and name and not hint(name, lengths=True)]
 
     def add(

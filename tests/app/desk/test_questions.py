@@ -5,10 +5,12 @@ from __future__ import annotations
 import datetime as dt
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from cmm_uq.app.desk.questions import check_answers, check_text, create, fields, kinds, tables_of
+from cmm_uq.app.desk.questions import _wanted, check_answers, check_text, create, fields, kinds, tables_of
+from cmm_uq.artefacts import names
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.look import template_folder
 from tests.conftest import ROOT
@@ -34,6 +36,18 @@ def test_a_line_with_blanks_in_its_name_makes_a_job_that_can_be_read(
     create("gauge_blocks", "e.csv", {"lines": lines}, values, "mine")
     assert tomllib.loads(Path("mine", "job.toml").read_text(encoding="utf-8"))["recording"]["lines"] == lines
     assert check_text("mine", None)["sound"]
+
+
+def test_what_stands_in_grey_in_a_field_is_read_as_the_job_has_it() -> None:
+    for kind in names():
+        begun = dict(_wanted(kind))
+        for one in (field for field in fields(kind) if field["example"]):
+            value: Any = tables_of({one["key"]: one["example"]})
+            for key in one["key"].split("."):
+                value = value[0] if isinstance(value, list) else value
+                value = value.get(key, {})
+            given = begun[one["key"]]
+            assert str(value) == str(given) if isinstance(given, dt.date | str) else value == given, (kind, one)
 
 
 def test_every_kind_of_an_export_has_a_picture_and_its_dozen() -> None:

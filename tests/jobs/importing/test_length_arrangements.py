@@ -332,3 +332,12 @@ def test_a_verdict_is_no_number_of_a_run() -> None:
         for k in range(4)
     ]
     assert read(lengths_of(rows)) == expected(3, 2)
+
+
+def test_a_column_that_the_job_names_stands_beside_lengths_whatever_it_is_called() -> None:
+    rows = ["Line;Nominal [mm];Measured [mm];Gauge"]
+    rows += [f"{i + 1};{LENGTHS[k]};{measured(i, k, 0)};{20 + i / 10:.1f}" for i in range(2) for k in range(4)]
+    keys = {"columns": {"temp_artefact_c": "Gauge"}, "lines": {f"{i}": f"along X from 0,{i},0" for i in (1, 2)}}
+    found = imported("\n".join(rows).encode(), "e0.csv", ImportKeys.model_validate(keys))
+    assert found.columns["temp_artefact_c"].tolist() == [20.0] * 8 + [20.1] * 8
+    assert "Gauge" not in " ".join(str(fact.value) for fact in found.recognised.facts if fact.key == "not_used")
