@@ -17,9 +17,8 @@ ALIGNED = np.sin(np.radians(10.0))  # a direction cosine below this does not cou
 # Part of the travel of each axis that a position is named by, which a line, produced to the ends of travel, crosses; this
 # project's figure, which leaves room for the fixture.
 CORNER_TO_CORNER = 0.75
-_LEAST_OF_AXIS = (
-    CORNER_TO_CORNER - 0.0005
-)  # three quarters to the last digit of a percentage with one: ends are measured
+# three quarters to the last digit of a percentage with one, for ends are measured
+_LEAST_OF_AXIS = CORNER_TO_CORNER - 0.0005
 _ROUNDING = 1e-6  # mm; a line as near as this to the end of an axis' travel lies in it
 PARALLELS = tuple(say("parallel to {axis}", axis=Verbatim(a.upper())) for a in AXES)
 SPACE_DIAGONALS = tuple(say("space diagonal {axes}", axes=Verbatim(f"{x}X {y}Y +Z")) for x in "+−" for y in "+−")

@@ -35,10 +35,8 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 DISAGREES = 0.001  # probability with which anything of a machine whose model fits would be found to disagree
 _ON_LINE = 0.05  # extent of points across a line over that along it
-_LINES, _SIZES = (
-    200,
-    200,
-)  # lines that are looked at, evenly of all; sizes of the noise, over which its variance is the mean
+# lines that are looked at, evenly of all; sizes of the noise, over which its variance is the mean
+_LINES, _SIZES = 200, 200
 
 Key = tuple[str, str]
 Kind = Literal["factor", "line", "length"]

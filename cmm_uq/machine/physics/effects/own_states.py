@@ -188,13 +188,8 @@ class OwnForm(OwnFault, OfDirections):
         return -MICROMETRE * normals[:, :, None] * harmonics(normals, turned_back(points))[:, None, :]
 
 
-ROUNDNESS = (
-    2,
-    3,
-    4,
-    5,
-    6,
-)  # lobes of a ring's form and of probes: the size and the place of a ring are those of 0 and 1
+# lobes of a ring's form and of probes: the size and the place of a ring are those of 0 and 1
+ROUNDNESS = (2, 3, 4, 5, 6)
 
 
 class OwnRoundness(OwnFault, OfDirections):
