@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.recorded import Display, display_step, distances_in_placing
 from cmm_uq.maths.inference.linear_model import Freedoms
@@ -37,7 +37,8 @@ def noise_of(
     if values is None:
         estimate = model.estimate()
         values = estimate.about
-        step = display_step(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
+        scatter = estimate.least_squares.sigma_of_residuals
+        step = display_step(artefact.points.xyz, scatter) or _step_of_lengths(artefact.points, scatter)
     xyz = model.placed(values)
     sensitivity = sensitivities(model, xyz)[chosen]
     rows = artefact.rows[chosen]
@@ -66,6 +67,15 @@ def noise_of(
         turn, shares, slow, frequency, tuple(name for name, can in possible.items() if can), model.sigma, gap, step,
         part,
     )  # fmt: skip
+
+
+def _step_of_lengths(points: Points, scatter: float) -> float:
+    """Step in which lengths are recorded, mm, of which their ends were made, as on a diagonal; 0 of other points."""
+    pairs = points.rows_of_groups
+    if any(len(rows) != 2 for rows in pairs) or any(name.startswith("reading_") for name in points.columns):
+        return 0.0
+    ends = points.xyz[np.array(pairs)]
+    return display_step(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), scatter)
 
 
 def _shows(model: RecordingModel, xyz: Floats, chosen: np.ndarray, block: Ints) -> bool:

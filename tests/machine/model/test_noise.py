@@ -11,9 +11,10 @@ import pytest
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, artefact_of, kind_of
-from cmm_uq.base.points import Floats
+from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel
-from cmm_uq.machine.model.noise import mean_and_contrasts, noise_of, repeated_quantity
+from cmm_uq.machine.model.noise import _step_of_lengths, mean_and_contrasts, noise_of, repeated_quantity
+from cmm_uq.machine.model.recorded import display_step
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Sizes
 from tests.artefacts.constructions import plate
 
@@ -153,3 +154,17 @@ def test_observations_repeat_each_other_when_they_are_one_quantity_of_one_placin
         assert len(np.unique(artefact.repeat[model.used][same])) == same.sum()
     readings = np.unique(np.column_stack([artefact.measurement[model.used], points]), axis=0)
     assert len(np.unique(number)) == observations_a_reading * len(readings)
+
+
+def test_lengths_on_a_diagonal_have_the_step_that_they_are_printed_to() -> None:
+    """105 lengths to 0.1 µm from one place: no noise is below what their last digit hides, though no coordinate has a step."""
+    length = np.round(100.0 * (1 + np.arange(105) % 5) + np.random.default_rng(5).normal(0, 3e-4, 105), 4)
+    way = np.array([0.6337, 0.6337, 0.4436]) / np.linalg.norm([0.6337, 0.6337, 0.4436])
+    from_start = np.stack([np.zeros((105, 3)), length[:, None] * way], axis=1).reshape(-1, 3)
+    ends = from_start + np.array([120.0, 190.0, 120.0])
+    number = np.repeat(np.arange(1, 106), 2)
+    points = Points(ends, number, np.tile([1, 2], 105), np.ones_like(number), Machine())
+    assert display_step(points.xyz, 1e-4) == 0.0
+    assert _step_of_lengths(points, 1e-4) == pytest.approx(1e-4)
+    assert _step_of_lengths(points, 3e-2) == 0.0  # beside which a tenth of a micrometre is nothing
+    assert _step_of_lengths(replace(points, columns={"reading_um": 0.0 * number}), 1e-4) == 0.0
