@@ -165,10 +165,15 @@ def _ring(part: Points, stylus: Stylus, bore: Bore) -> ProposedMeasurement:
     columns = {**_probed(stylus, len(out)), **_along("n", n), **_along("approach_", -np.sign(np.round(n, 6)))}
     points = _points(part, middle + 0.5 * bore.diameter_mm * out, ones, np.arange(1, len(out) + 1), columns)
     facts = RingFacts(kind="ring", length_mm=bore.diameter_mm, u_um=RING_UM, plug=plug)
-    sized: dict[str, Text | float] = {"mm": number(bore.diameter_mm, "g"), "u": number(RING_UM, "g"), "count": len(out)}
-    of_bore = say("calibrated ring of {mm} mm (u = {u} µm) in place of the bore, {count} points around", **sized)
+    mm, u, count = number(bore.diameter_mm, "g"), number(RING_UM, "g"), len(out)
+    of_bore = say(
+        "calibrated ring of {mm} mm (u = {u} µm) in place of the bore, {count} points around", mm=mm, u=u, count=count
+    )
     of_shaft = say(
-        "calibrated plug gauge of {mm} mm (u = {u} µm) in place of the shaft, {count} points around", **sized
+        "calibrated plug gauge of {mm} mm (u = {u} µm) in place of the shaft, {count} points around",
+        mm=mm,
+        u=u,
+        count=count,
     )
     return ProposedMeasurement(of_shaft if plug else of_bore, RingGauge(facts, points), (RADIUS,))
 
