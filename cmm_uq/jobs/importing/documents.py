@@ -283,13 +283,22 @@ class Json(Format):
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         text, encoding = decoded(content, where, keys.encoding)
         try:
-            whole = json.loads(text.lstrip("\ufeff"), parse_float=str, parse_int=str, parse_constant=str)
+            as_text: Any = dict.fromkeys(("parse_float", "parse_int", "parse_constant"), str)
+            whole = json.loads(text.lstrip("\ufeff"), object_pairs_hook=_once, **as_text)
         except (ValueError, RecursionError) as error:
             line = getattr(error, "lineno", 0)
             at = f"{where} line {line}" if line else where
             fix = "Export it again: it was cut off or changed"
             raise CmmUqError(f"is damaged JSON: {error}", where=at, fix=fix) from None
-        return [_of_records(whole, where, Fact("encoding", say("Encoding"), Verbatim(encoding)))]
+        return [
+            _of_rows(_Records(whole, where).rows, None, where, Fact("encoding", say("Encoding"), Verbatim(encoding)))
+        ]
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(found := dict(pairs)) < len(pairs):  # neither value is left out unsaid
+        raise ValueError("a record has a name twice")
+    return found
 
 
 class Xml(Format):
@@ -302,13 +311,14 @@ class Xml(Format):
         return head_text(head).lstrip("\ufeff \r\n\t").startswith("<?xml")
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        return [_of_records(_nested(root_of(content, where), where, 0), where)]
+        return [_of_rows(_Records(_nested(root_of(content, where), where, 0), where).rows, None, where)]
 
 
 def _nested(element: Element, where: str, depth: int) -> Any:
     """An element as JSON would have it: one that has nothing but a text is that."""
     _check_depth(depth, where)
-    text, inside = " ".join((element.text or "").split()), dict[str, list[Any]]()
+    texts, inside = [element.text or "", *(one.tail or "" for one in element)], dict[str, list[Any]]()
+    text = " ".join(" ".join(texts).split())
     for one in element:
         inside.setdefault(local(one), []).append(_nested(one, where, depth + 1))
     if not inside and not element.attrib:
@@ -382,12 +392,7 @@ def _parts(key: str, value: Any) -> dict[str, Any]:
     return {f"{key} {k}": part for k, part in enumerate(value, 1)} if isinstance(value, list) else {key: value}
 
 
-def _of_records(whole: Any, where: str, *facts: Fact) -> Sheet:
-    rows = _Records(whole, where).rows
-    return _of_rows(rows, [*range(1, len(rows) + 1)], where, *facts)
-
-
-def _of_rows(rows: list[list[Cell]], lines: list[int], where: str, *facts: Fact) -> Sheet:
+def _of_rows(rows: list[list[Cell]], lines: list[int] | None, where: str, *facts: Fact) -> Sheet:
     if not rows or len(rows) > ROWS.most:
         raise CmmUqError("holds no table" if not rows else "is too long", where=where, fix=_EXPORT)
-    return Sheet("", rows, lines, facts=facts)
+    return Sheet("", rows, lines or [*range(1, len(rows) + 1)], facts=facts)

@@ -56,6 +56,7 @@ REFUSED = {
     "a picture": (b"\x89PNG\r\n\x1a\n" + bytes(50), "is a picture"),
     "a web page": (b"<!DOCTYPE html><html></html>", "holds no table"),
     "half a JSON": (b'{"lines": [{"nominal": 100.0, ', "line 1: is damaged JSON"),
+    "a name twice in JSON": (b'{"lines": [{"x": 1.0, "y": 2.0, "x": 3.0}]}', "is damaged JSON: a record has a name twice"),
     "nested JSON": (b'{"a": ' * 500 + b"1" + b"}" * 500, "more than 40 deep"),
     "nested lists": (b'["a", ' + b"[" * 100_000, "is damaged JSON"),
     "nested XML": (b"<?xml version='1.0'?>" + b"<a>" * 60 + b"</a>" * 60, "more than 40 deep"),
