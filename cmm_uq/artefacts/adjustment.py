@@ -10,7 +10,6 @@ for a product of angles. Where the order is another the same holds of the axes i
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from cmm_uq.artefacts.distance_equations import FACTORS, DistanceSolution
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.document import (
     Block,
     Column,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
@@ -13,6 +12,7 @@ from cmm_uq.artefacts.digitizer import ANGLES, OFFSET, THREE, DigitizerArtefact,
 from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table, columns, figure_columns
 from cmm_uq.certificate.origin import quantity_data
 from cmm_uq.certificate.plots.residuals import length_plot

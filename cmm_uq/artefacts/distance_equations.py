@@ -9,7 +9,6 @@ by an orthogonal factorisation.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, commas, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.certificate.result import AtLeast, as_evaluated
 from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
 from cmm_uq.maths.uncertainty.type_a import coverage_factor

@@ -7,7 +7,6 @@ point just before contact: it tells on which side the probe was (US 4,866,643 cl
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -23,6 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, in_a_row, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Block, Column, Section, Table, section, table
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from itertools import product
 from types import MappingProxyType
 from typing import cast
@@ -28,6 +27,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.artefact import ArtefactFigure, Indications, Size, figures_of_errors, ranges_of_repeats
 from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
 from cmm_uq.machine.model.placed import Rigid

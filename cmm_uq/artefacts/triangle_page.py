@@ -13,7 +13,6 @@ finds a part only of the squareness, half of it at most.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import degrees
 from typing import Any, cast
 
@@ -24,6 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Block, Paragraph, Plot, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.plots.residuals import deviations_plot
 from cmm_uq.certificate.result import Page, Result

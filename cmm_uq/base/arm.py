@@ -18,7 +18,6 @@ rows without approximation.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine
+from cmm_uq.base.values import dataclass, field, replace
 
 A, ALPHA, D, THETA, BETA = range(5)  # parameters of a row
 _TURNS = np.array([False, True, False, True, True])

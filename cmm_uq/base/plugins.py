@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from traceback import walk_tb
@@ -17,6 +16,7 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.values import dataclass
 
 EFFECTS, KINDS, STANDARDS, IMPORTS = "cmm_uq.effects", "cmm_uq.kinds", "cmm_uq.standards", "cmm_uq.imports"
 # what is offered in each group of entry points

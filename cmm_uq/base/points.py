@@ -7,7 +7,6 @@ artefacts turn them into observations.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from math import comb
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import HOUR
+from cmm_uq.base.values import dataclass, field, replace
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -6,11 +6,11 @@ Coordinates lie on the last table, errors in the axes of the machine. With all r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from cmm_uq.base.points import AXES, Floats, Machine
+from cmm_uq.base.values import dataclass, field
 
 ROTARY = dict(zip("abc", AXES, strict=True))  # by the letter of a rotary axis the axis that it is parallel to (ISO 841)
 NORMALS = tuple(f"n{axis}" for axis in AXES)  # columns, along the axes of the coordinates

@@ -8,7 +8,6 @@ A recording that nobody measured has no certificate, so nothing is asked of it.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,6 +16,7 @@ from cmm_uq.base import messages
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, semicolons, sentences
 from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE, Unit, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section, section
 from cmm_uq.certificate.origin import CERTIFICATE
 from cmm_uq.certificate.wording import NO_FACTOR, expanded

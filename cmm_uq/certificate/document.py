@@ -12,13 +12,13 @@ import datetime as dt
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, Literal
 
 from cmm_uq import __version__
 from cmm_uq.base.languages.translation import ENGLISH, Code, code_of, translated as said_in
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.values import asdict, dataclass, fields, is_dataclass, replace
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.logo import Logo
 

@@ -9,7 +9,6 @@ import datetime as dt
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
 from io import StringIO
 from math import isfinite
 from pathlib import PurePosixPath
@@ -19,6 +18,7 @@ from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, day, listed, names, number, say, together
 from cmm_uq.base.plugins import KINDS, STANDARDS, versions
+from cmm_uq.base.values import asdict, dataclass, replace
 from cmm_uq.certificate.document import Document, Table, table
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.machine_state import PassedFacts

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -18,6 +17,7 @@ from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, at_key, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.certificate.document import Document, Section
 from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificates
 from cmm_uq.certificate.plots.style import lettered_in

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, foreign, lines, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Standing
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every, stated_effects

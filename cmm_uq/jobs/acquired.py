@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import hypot
 from pathlib import PurePosixPath
 from typing import Any
@@ -17,6 +16,7 @@ from pydantic import Field, ValidationError
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, names, plural, say, sentences
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.reports import ResultsPart
 from cmm_uq.jobs.tables.conformity import TestUncertainty
 from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED

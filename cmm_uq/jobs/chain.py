@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, day, say, semicolons, sentences
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.acquired import ARTEFACT
 from cmm_uq.jobs.job import CIRCULAR, Job
 from cmm_uq.jobs.reports import AS_FOUND

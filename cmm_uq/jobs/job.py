@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,6 +17,7 @@ from cmm_uq.base.files.table import JobTable, Limit, Names, Number, at_least, ke
 from cmm_uq.base.messages import Text, html_table, say
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.acquired import Provenance
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
 from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts

@@ -7,11 +7,11 @@ import re
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NoReturn
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LOGO_BYTES, LOGO_ELEMENTS, LOGO_PIXELS
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.importing.cells.encodings import local, root_of
 from cmm_uq.jobs.tables.identification import Laboratory
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,6 +15,7 @@ from cmm_uq.base.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYT
 from cmm_uq.base.files.toml_file import checked, toml_of
 from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import Machine, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.derived_job import files_of, prediction_of
 from cmm_uq.jobs.importing.cells.encodings import begins_with

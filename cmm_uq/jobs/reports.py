@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import hypot
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -17,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import LARGEST_UM, SMALLEST_UM
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.source import RESULTS
 from cmm_uq.jobs.tables.identification import SIMULATED, Origin
 from cmm_uq.jobs.tables.machine import DigitizerFacts, Pose

@@ -7,11 +7,11 @@ import os
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import FILE_NAME, Limit, content_of
+from cmm_uq.base.values import dataclass
 
 # names that commands write, or attach to a certificate, beside the recording of a job
 _WRITTEN = re.compile(

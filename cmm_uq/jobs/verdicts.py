@@ -6,12 +6,12 @@ Every output that says whether something conforms takes it from here: a document
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.units import UNITS, printed_unit
+from cmm_uq.base.values import dataclass
 
 # verdicts of a diagnosis: nothing is found; noise and an error are not told apart; a cause, or part of it, is found; a
 # function is, without a name; nothing that predicts is

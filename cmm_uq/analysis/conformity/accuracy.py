@@ -7,7 +7,6 @@ with the model and the noise of each draw, about their own mean (JCGM 101:2008, 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,7 @@ from cmm_uq.analysis.screening.screening import counted_with
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PRINTED, Unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact

@@ -7,7 +7,6 @@ this project's own. Places are those from the base of the arm, whose reach the j
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -37,6 +36,7 @@ from cmm_uq.base.arm import Arm
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.machine.model.kind import FORMS, LENGTHS
 

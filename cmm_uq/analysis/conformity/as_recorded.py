@@ -6,7 +6,6 @@ import contextlib
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from cmm_uq.analysis.screening.screening import REVERSED, with_sound_sensors
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Message, Text, commas, number, say
 from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Forms, Indications
 from cmm_uq.machine.model.kind import Observed

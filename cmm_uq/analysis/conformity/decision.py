@@ -7,7 +7,6 @@ or a form on one. Integrals are Gauss–Legendre sums over panels that are narro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import erfc, hypot, isfinite, sqrt
 from statistics import NormalDist
@@ -17,6 +16,7 @@ import numpy as np
 import scipy
 
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.tables import conformity
 from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, Rule
 from cmm_uq.maths.inference.slow import root

@@ -8,7 +8,6 @@ too few for are those of a normal distribution where these are larger.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 import numpy as np
@@ -18,6 +17,7 @@ from cmm_uq.analysis.conformity import decision
 from cmm_uq.analysis.conformity.decision import COVERAGE_FACTOR, Outcome, PriorKnowledge, guard_width, rule_name
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.tables.conformity import Rule
 
 RARE = 50  # Draws beyond a limit, from which on their share is taken for the probability

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby, product
 
 import numpy as np
@@ -14,6 +13,7 @@ from cmm_uq.analysis.conformity import plans
 from cmm_uq.analysis.conformity.plans import BarPlan, Condition, LengthPlan, Plan, SpherePlan, position_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, number, plural, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import nominal
 

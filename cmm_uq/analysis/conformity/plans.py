@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Machine
+from cmm_uq.base.values import dataclass
 
 ALIGNED = np.sin(np.radians(10.0))  # a direction cosine below this does not count: as good as square to that axis
 # Part of the travel of each axis that a position is named by, which a line, produced to the ends of travel, crosses; this

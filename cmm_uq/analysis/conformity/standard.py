@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from typing import Literal
 
@@ -19,6 +18,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.recording.beside import ShortGauge
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, TestUncertainty, needed, needs_prior

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Literal
 
@@ -18,6 +17,7 @@ from cmm_uq.analysis.conformity.decision import Decision, Risks
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, say
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import UNITS
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.tables.conformity import ClausesForm, ConformityFacts, HeldClause
 from cmm_uq.jobs.verdicts import TOLERANCE_OUTCOMES, Verdict
 from cmm_uq.maths.uncertainty.budget import Budget

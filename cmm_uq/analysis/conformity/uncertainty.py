@@ -7,7 +7,6 @@ one set-up (ISO/TS 23165:2006): the probability that all conform is not the prod
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -16,6 +15,7 @@ from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import HOUR, MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.tables.conformity import Circumstances, RatedConditions, TestUncertainty, key_of_line
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget

@@ -15,7 +15,6 @@ end it, and it is no reason to doubt what is found.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import combinations as subsets
 
 import numpy as np
@@ -38,6 +37,7 @@ from cmm_uq.analysis.diagnosis.empirical.model import ODDS
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import LinearModel, solve
 from cmm_uq.maths.uncertainty.quantity import Quantity

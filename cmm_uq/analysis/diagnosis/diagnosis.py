@@ -7,7 +7,6 @@ their mixture, weighted by their probabilities and kept as draws, for an estimat
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
@@ -25,6 +24,7 @@ from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.verdicts import AGREES
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed

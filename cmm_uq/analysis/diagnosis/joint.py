@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import scipy
@@ -14,6 +13,7 @@ from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED, SearchResult, 
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
+from cmm_uq.base.values import dataclass, fields, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import with_curvature
 from cmm_uq.machine.model.noise import noise_of

@@ -7,7 +7,6 @@ only where it carries evidence beside the first. A length shows half of its resi
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +20,7 @@ from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

@@ -8,7 +8,6 @@ observations, as a table of deviations is that was joined wrongly.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import combinations, permutations, product
 
@@ -18,6 +17,7 @@ from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.base.messages import Text, Verbatim, commas, number, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import Unit, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.predicted_errors import PredictedErrors
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
@@ -11,6 +10,7 @@ import scipy
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, Unknown

@@ -8,7 +8,6 @@ that no other is said to be as possible. (Baarda 1968, Teunissen 2018: minimal d
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +20,7 @@ from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, draw_nothing
 from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.physics.effect import Effect

@@ -8,7 +8,6 @@ the diagnosis compared with the prediction as it is.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from cmm_uq.analysis.diagnosis.held_out import held_out_groups, predictions
 from cmm_uq.base.messages import NOTHING as NO_TEXT, Text, number, say, signed
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE, Unit, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.predicted_errors import PredictedErrors
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, solve

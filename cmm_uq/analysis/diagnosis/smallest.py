@@ -11,7 +11,6 @@ by odds: their z² differ by more than a threshold. What remains is one integral
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import comb, sqrt
 
 import numpy as np
@@ -27,6 +26,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import Unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect

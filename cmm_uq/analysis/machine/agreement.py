@@ -13,7 +13,6 @@ less spread than that: of models that fit fewer than one in a thousand disagree.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -25,6 +24,7 @@ from cmm_uq.analysis.machine.recordings import components_of, shown_in_parts
 from cmm_uq.analysis.machine.state import StatedNoise
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, Unit, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.effect import Effect

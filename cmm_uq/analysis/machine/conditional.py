@@ -16,7 +16,6 @@ together. What is denied most goes first, and the others are looked at anew with
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -25,6 +24,7 @@ from cmm_uq.analysis.machine import recordings
 from cmm_uq.analysis.machine.state import GivenSizes, MachineState, StatedNoise, StatementEvidence, Unmodelled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.field import AtPoints, GivenPeriod, covariance, family_of, linear
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths

@@ -11,7 +11,6 @@ What a map is worth shows on set-ups that it was not made from: it is made anew 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +24,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.field import AxisFunction, GivenPeriod
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.measurement import RecordingModel

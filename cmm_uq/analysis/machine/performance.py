@@ -23,7 +23,6 @@ takes away from what others make (Pratt, Proc. 2nd Tampere Conf. in Statistics (
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +33,7 @@ from cmm_uq.analysis.conformity.accuracy import UNITS
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
 
 from cmm_uq.analysis.machine.state import Change, MachineState, changes, of_machine
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.field import GivenPeriod, linear as trials
 from cmm_uq.machine.model.measurement import RecordingModel

@@ -18,7 +18,6 @@ What is stated of a machine's axes: how each is read, in place of what physics a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 
@@ -46,6 +45,7 @@ from cmm_uq.analysis.machine.state import StatementEvidence, Unmodelled, of_mach
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.field import ALLOWED, as_read, curves, family_of
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.measurement import RecordingModel

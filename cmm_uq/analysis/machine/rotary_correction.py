@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.physics.effects.rotary import EFFECTS, OfRotary, RotaryFunction

@@ -13,7 +13,6 @@ were, with the age of the certificate.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from datetime import date
 from functools import cached_property
 from typing import Any
@@ -23,6 +22,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.model.field import ALLOWED, PERIODIC, PLAY, bounded, curves, family_of
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from cmm_uq.analysis.parts.plan import PartFeature
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.part.feature import ORIENTED, Kind
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.repeated import MANY, Drawn, Raised, Repeated, one_by_one

@@ -13,7 +13,6 @@ and 1; errors that are tied to each other have shares that add up to more, error
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, FORM, OPERATOR, R
 from cmm_uq.analysis.parts.virtual import AtPose, Virtual, in_parts
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.part.feature import Kind
 
 DRAWS = 2**13  # of each of the two samples; shares are then known to about one in a hundred

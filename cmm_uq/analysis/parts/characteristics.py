@@ -11,7 +11,6 @@ evaluated.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +21,7 @@ from cmm_uq.analysis.parts.datums import BEST_FIT, PartFrame
 from cmm_uq.analysis.parts.plan import FORMS, ORIENTATIONS, RUNOUTS, ZONES, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.part.feature import ASKS, AXIAL
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.repeated import Repeated

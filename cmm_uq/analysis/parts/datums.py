@@ -13,7 +13,6 @@ bearing seats have one axis, which is neither of the two that they have alone, a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +22,7 @@ from cmm_uq.analysis.parts.association import VALUES, Features, ProbedFeature, c
 from cmm_uq.analysis.parts.plan import PartFeature, as_datum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.part.feature import ROUND, TURNED, Kind
 
 # sine of the angle between two datums below which the second says nothing of the rotation about the first, some 6°

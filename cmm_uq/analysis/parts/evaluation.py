@@ -8,7 +8,6 @@ features in both: a position is not linear where it is small.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -19,6 +18,7 @@ from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation, Key,
 from cmm_uq.analysis.parts.datums import BEST_FIT, BestFit, DatumSystem, ProbedCommon
 from cmm_uq.analysis.parts.plan import FORMS, PartFeature, Plan
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.geometry.association import Association
 
 Known = dict[tuple[str, Association, bytes], ProbedFeature]  # features by name, association and points

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +14,7 @@ from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual, thinned
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.measurement import RecordingModel
 
 LEVELS = (0.1, 0.5, 0.9)  # of ten machines as this may be, that of one, five and nine is no larger

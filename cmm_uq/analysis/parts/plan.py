@@ -10,13 +10,13 @@ scales and guideways go by readings, and rotations of carriages act on the tip t
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points, beyond_travel
+from cmm_uq.base.values import dataclass, field, fields, replace
 from cmm_uq.jobs.part.feature import ASKS, FEWEST, ORIENTED, Kind, What
 from cmm_uq.maths.geometry.association import ASSOCIATIONS, Association
 

@@ -14,7 +14,6 @@ point to one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from cmm_uq.analysis.parts.setup import plan_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, names, say
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.part.feature import ASKS
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.readings import FAR_MM, in_another_unit

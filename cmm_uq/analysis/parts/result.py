@@ -27,7 +27,6 @@ Baranchik, Ann. Math. Stat. 41 (1970) 642). Of form itself all is what the part 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -40,6 +39,7 @@ from cmm_uq.analysis.parts.evaluation import Movement, characteristics_of
 from cmm_uq.analysis.parts.plan import PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.part.feature import FEWEST as FEWEST_POINTS
 from cmm_uq.maths.geometry.association import associate
 from cmm_uq.maths.inference.slow import root

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
-from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 
 import numpy as np
@@ -36,6 +35,7 @@ from cmm_uq.analysis.parts.plan import FORMS, PartPose, Plan, placed
 from cmm_uq.analysis.parts.result import Inverse, alike, inverse, nodes_of, trial_parts
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.model.field import family_of
 from cmm_uq.maths.uncertainty.propagation import Simulated, Source, simulate_adaptively
 

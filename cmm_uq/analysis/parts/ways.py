@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -16,6 +15,7 @@ from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say, signed
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 
 WAY_DRAWS = 10_000  # of each way; u is then known to 0.7 %.
 _THINNED = 0.05  # of u: nine ways of one plan differed by 0 to 7 % from those by all 8000 points of its feature

@@ -6,7 +6,6 @@ Information of every unknown (Atkinson, Donev & Tobias 2007, 5.1), by which they
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -17,6 +16,7 @@ from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, Start, Volum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.measurement import ARTEFACT

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -24,6 +23,7 @@ from cmm_uq.analysis.planning.candidates import (
 from cmm_uq.analysis.planning.set_up import SetUp, repeat_points
 from cmm_uq.analysis.planning.setting import PlannedNoise, Setting, uncorrelated, white_noise
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.tables.conformity import Circumstances
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact_doubt import causes_of

@@ -6,7 +6,6 @@ How such a plan is found is in :mod:`cmm_uq.analysis.planning.suggestion`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Message, Text, Verbatim, in_a_row, number, plural, say, semicolons, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.physics.catalogue import every

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -15,6 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import noise_found, results_named
 from cmm_uq.jobs.tables.artefact import ArtefactFacts

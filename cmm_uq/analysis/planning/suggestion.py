@@ -7,7 +7,6 @@ else fitted anew. Which of the two is true is not known: what counts is the wors
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
 
@@ -30,6 +29,7 @@ from cmm_uq.analysis.planning.set_up import ODDS, DetectionChange, DetectionGoal
 from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model import RecordingModel

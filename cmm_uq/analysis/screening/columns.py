@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.messages import Text, Verbatim, alternatives, commas, listed, number, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.values import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations, pairwise
 
@@ -16,6 +15,7 @@ from cmm_uq.analysis.screening.shape import ArtefactShape, Mistake, block_mistak
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, plural, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.physics.kinematics import MOST_LEAN, axis_directions

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby
 
@@ -17,6 +16,7 @@ from cmm_uq.analysis.screening.shape import COORDINATES, Screening
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, comma_or, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.maths.inference.linear_model import LinearModel

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
 from functools import partial
 from itertools import combinations
 
@@ -12,6 +11,7 @@ import numpy as np
 from cmm_uq.analysis.screening.columns import WAYS
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.machine.model.artefact import Placings
 
 # Misfit that no machine's errors explain: so many mm, and so much of the artefact's size

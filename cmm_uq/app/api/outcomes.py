@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -18,6 +17,7 @@ from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.units import printed_unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.diagnosis.sections import field_picture
 from cmm_uq.certificate.document import Document

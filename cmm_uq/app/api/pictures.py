@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property, partial
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, html_table
 from cmm_uq.base.units import printed_unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Document, Table
 from cmm_uq.certificate.plots.style import as_svg, figures_kept
 from cmm_uq.jobs.columns import WHOLE

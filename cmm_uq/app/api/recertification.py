@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.commands.laboratory.due import WhatIsDue, history_of, what_is_due, write_due, write_history
 from cmm_uq.base.messages import html_table
+from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.due.drift import PARTS
 from cmm_uq.laboratory.due.history import MachineHistory
 

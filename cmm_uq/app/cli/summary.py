@@ -9,7 +9,6 @@ from __future__ import annotations
 import json as json_text
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ from cmm_uq.app.cli.options import Ending
 from cmm_uq.app.cli.terminal import NOT_CONFORMING, Line, columns, folded, on_terminal, put_data, put_json, say, show
 from cmm_uq.base.errors import printable
 from cmm_uq.base.output import MANIFEST
+from cmm_uq.base.values import dataclass
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Written

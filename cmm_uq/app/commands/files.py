@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -15,6 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import NOTHING, Text
 from cmm_uq.base.output import Ledger, Owner, staged
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.document import translated as said
 from cmm_uq.certificate.origin import as_json, file_name, made_after, marked
 from cmm_uq.certificate.plots.style import fonts_of

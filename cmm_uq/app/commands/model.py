@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from cmm_uq.base.files.limits import FREEDOMS, OBSERVATIONS
 from cmm_uq.base.messages import Text, Verbatim, in_a_row, plural, say, signed
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.result import OwnAnalysis, Recipe
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.compared import KEY, SimulationFacts

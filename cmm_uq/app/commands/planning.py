@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.effect import Effect

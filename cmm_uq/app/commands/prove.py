@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -30,6 +29,7 @@ from cmm_uq.base.output import interruption
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import BrokenPluginError, naming_package
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.certificate.result import JobDiagnosis, Outcome, OwnAnalysis
 from cmm_uq.jobs.job import Job

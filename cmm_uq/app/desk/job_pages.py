@@ -7,7 +7,6 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from difflib import unified_diff
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.output.manifest import plain_name
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdict, Verdicts
 
 READ, ARTEFACT, FIELDS = f"{DESK}/read", f"{DESK}/artefact", f"{DESK}/fields"

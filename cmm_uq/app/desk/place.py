@@ -16,7 +16,6 @@ import shutil
 import threading
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from cmm_uq.app.serve.exchange import WebRequest, read_dropped
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.output.staging import replace_file
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.source import check_name, device_name
 
 LONGEST = 100  # characters of a name that is made of a dropped one

@@ -21,7 +21,6 @@ import threading
 import time
 import tomllib
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from typing import Literal, get_args
@@ -33,6 +32,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.output.staging import replace_file
+from cmm_uq.base.values import dataclass
 
 Role = Literal["read", "work"]
 SIGN_OUT = f"{ACCOUNT}/sign-out"

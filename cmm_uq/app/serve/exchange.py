@@ -13,7 +13,6 @@ import datetime as dt
 import hashlib
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
 from http import HTTPStatus
 from pathlib import PurePosixPath
 from typing import BinaryIO
@@ -22,6 +21,7 @@ from urllib.parse import parse_qsl, quote, urlsplit
 from cmm_uq.app.serve.page import WebPage, address, page
 from cmm_uq.base.errors import printable, shortened, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.values import dataclass, field
 
 DESK = "/desk"  # where the pages of a desk begin
 ACCOUNT = "/account"

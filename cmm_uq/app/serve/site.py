@@ -18,7 +18,6 @@ import json
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -37,6 +36,7 @@ from cmm_uq.app.serve.lists import (
 )
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, plural, say
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import RecordedCertificate

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
@@ -15,6 +14,7 @@ from cmm_uq.app.serve.exchange import WebRequest
 from cmm_uq.app.serve.page import DECISIONS, VERDICTS, Cell, PageTable, address
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.due.due import DueItem
 from cmm_uq.laboratory.records.facts import ChainFinding

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.rotary import RotaryMachine
 from cmm_uq.base.units import METRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.recorded import refuse
 
 ALONG, ACROSS, TURNING, CIRCLE = "along", "across", "turning", "circle"

@@ -9,7 +9,6 @@ goes on at another level. The measure is how far the readings of that very map u
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from itertools import combinations
 
@@ -20,6 +19,7 @@ from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.messages import Text, Verbatim, commas, listed, number, say, signed
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, Unit, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.error_map import COLUMNS, ErrorMap
 
 _LAST_DIGIT = 1e-9  # mm

@@ -13,7 +13,6 @@ over the rest.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +29,7 @@ from cmm_uq.artefacts.error_maps.columns import MapColumn, roughness
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import PPM, REFERENCE_TEMPERATURE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.effects.thermal import EXPANSION, SCALE_EXPANSION
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.posterior import Density

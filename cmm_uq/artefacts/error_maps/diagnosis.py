@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Section, figure_columns, section, table
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.predicted_errors import WHERE, maps_of

@@ -9,7 +9,6 @@ too, is taken to be none (least squares with inner constraints; Hughes et al. 20
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -20,6 +19,7 @@ from cmm_uq.artefacts.multilateration.artefact import Multilateration
 from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import METRE, MICROMETRE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.plots.residuals import deviations_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, cast
 
@@ -14,6 +13,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Column, Table, figure_columns
 from cmm_uq.certificate.wording import numbered
 from cmm_uq.machine.model.recorded import columns_needed, place

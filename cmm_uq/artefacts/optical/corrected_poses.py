@@ -11,7 +11,6 @@ Int. J. Robot. Res. 6 (1987) 3), so that both are those that the rows of the job
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -23,6 +22,7 @@ from cmm_uq.artefacts.optical.tracked import TrackedPoints, noise_by_pose
 from cmm_uq.base.arm import THETA, Arm, D
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import METRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.superposition import Superposition
 from cmm_uq.maths.geometry.feature import nearest_rotations

@@ -11,14 +11,13 @@ the likeliest values are taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import gammaln
 
 from cmm_uq.base.arm import THETA, Arm
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.values import dataclass
 
 _LEAST, _MOST = 1e-4, 0.45  # of 1/ν
 _START = (0.3, 0.1)

@@ -11,7 +11,6 @@ the rotation that carries them, as they sit on the flange (``tip_x_mm``, …), t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from cmm_uq.analysis.conformity.robots import ANGLES, METRE_ARC, counting
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Table, figure_columns, table
 from cmm_uq.machine.model.artefact import ArtefactFigure, Placings
 from cmm_uq.maths.geometry.feature import nearest_rotations

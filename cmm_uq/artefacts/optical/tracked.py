@@ -8,7 +8,6 @@ commanded again and again (``repeat``) have pose accuracy and repeatability too 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
 from typing import Any, TypeGuard, cast
 
 import numpy as np
@@ -25,6 +24,7 @@ from cmm_uq.base.arm import ALPHA, BETA, THETA, A, Arm, D
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.document import Block, Column, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.plots.volume import vector_plot
 from cmm_uq.certificate.result import Page, Result

@@ -8,7 +8,6 @@ The artefact's dimensions X and the slope are free; D is known, or known within 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import HOUR, MICROMETRE, PPM, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.machine.physics.error_map import ErrorMap

@@ -9,7 +9,6 @@ points are strongly correlated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 
 Readings = NDArray[Any]  # (..., n) mm; real, or complex where a derivative is taken by a complex step
 Method = Literal["pitch", "improved"]  # ``pitch``: equation (6), equal or unequal pitch; ``improved``: equation (8)

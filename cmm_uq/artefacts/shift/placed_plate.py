@@ -5,7 +5,6 @@ Neither the plate nor its placings need be known: rigid motions that lay all pla
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +13,7 @@ from cmm_uq.artefacts.shift.series import Means, means_over_repeats
 from cmm_uq.artefacts.shift.smooth import Scatter
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.values import dataclass
 
 _ALIKE_MM, _ALIKE_RAD = 1.0, np.radians(1.0)  # placings nearer to each other than this are the same
 _STEP = 1e-5  # rad

@@ -6,7 +6,6 @@ line through its ends; squareness, of these lines; the rotation of a carriage th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -23,6 +22,7 @@ from cmm_uq.artefacts.shift.smooth import sampled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.artefact import ArtefactFigure
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS

@@ -14,7 +14,6 @@ moves along it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from cmm_uq.artefacts.shift.smooth import SmoothFunction, SmoothModel
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.machine.physics.kinematics import carried_offset

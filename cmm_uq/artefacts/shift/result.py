@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -28,6 +27,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.clauses import artefact_rows, certificate_rows, traceability_section
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section, section
 from cmm_uq.certificate.origin import file_name, quantity_data

@@ -6,7 +6,6 @@ dimensions. Between places that no chain of shifts joins, the error may differ b
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -16,6 +15,7 @@ from cmm_uq.artefacts.shift.smooth import Scatter
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import HOUR
+from cmm_uq.base.values import dataclass
 
 _ALIKE = 1e-3  # shifts nearer to each other than this are the same, mm
 _LATER = 0.01  # root of the sum of squares of the times between repeats, h, from which on they show a drift

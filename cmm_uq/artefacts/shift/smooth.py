@@ -18,7 +18,6 @@ Few observations: factor their covariance. Fewer coefficients: factor their prec
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
 from math import gamma, pi, sqrt
 
@@ -26,6 +25,7 @@ import numpy as np
 from scipy import linalg
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.inference.draws import evenly
 from cmm_uq.maths.inference.ensembles import Chains, Progress, run_ensembles
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS

@@ -11,7 +11,6 @@ import csv
 import io
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
@@ -19,6 +18,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit, text_of
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 
 # sizes of a number in a table, other than 0: squares and sums of 10⁵ of them stay far within a double's range
 SMALLEST, LARGEST = 1e-30, 1e15

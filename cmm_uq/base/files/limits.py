@@ -10,11 +10,11 @@ from __future__ import annotations
 import os
 import stat
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.values import dataclass
 
 
 @dataclass(frozen=True)

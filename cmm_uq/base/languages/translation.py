@@ -12,13 +12,13 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self, get_args
 
 from cmm_uq.base.messages import Argument, Day, Message, Number, PatternFormatter, Plural, Text, fields_of, printed
+from cmm_uq.base.values import dataclass
 
 Code = Literal["en", "de", "fr", "ja"]  # of a language, by BCP 47
 ENGLISH: Code = "en"  # what every text is written in; no catalogue is read for it

@@ -15,13 +15,13 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import interruption
+from cmm_uq.base.values import asdict, dataclass
 
 MANIFEST = "manifest.json"
 SCHEMA = "cmm-uq/manifest/1"

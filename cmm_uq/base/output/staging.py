@@ -17,7 +17,6 @@ import secrets
 import shutil
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from hashlib import file_digest, sha256
 from pathlib import Path
@@ -26,6 +25,7 @@ from typing import Protocol
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import interruption, manifest
 from cmm_uq.base.output.manifest import JOURNAL, MANIFEST, NEW, Journal, Manifest, Owner, journal_for, place, writing_to
+from cmm_uq.base.values import dataclass
 
 
 def locked(path: Path, *, create: bool) -> int | None:

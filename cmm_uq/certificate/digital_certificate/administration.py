@@ -7,13 +7,13 @@ capitals, their laboratory is named as nobody, and no word of conformity is said
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
 from cmm_uq.base.languages.translation import ENGLISH, Code, translated
 from cmm_uq.base.messages import Day, Number, Text, Verbatim, day, say
 from cmm_uq.base.units import MICROMETRE, UNITS
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, claimed, draft, replaced_certificate
 from cmm_uq.certificate.origin import BANNERS, made_after
 from cmm_uq.certificate.results.provenance import Reissue

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import chain, count
 from types import MappingProxyType
@@ -19,6 +18,7 @@ from typing import Any
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import PRINTED, UNITS, Unit
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.certificate.digital_certificate.administration import P_STANDARD, Languages, english
 from cmm_uq.certificate.wording import effect_of, effect_title, parameter_title
 from cmm_uq.jobs.dcc import certificate as dcc

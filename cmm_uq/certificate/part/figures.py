@@ -6,7 +6,6 @@ A part in a few lines, for the end of a command: decisions, figures, what makes 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import degrees, isfinite
 
@@ -18,6 +17,7 @@ from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, day, names, number, plural, say, signed
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
 from cmm_uq.certificate.wording import Figure, Headline, Summary, probability, titles
 from cmm_uq.jobs.part.feature import CharacteristicFacts

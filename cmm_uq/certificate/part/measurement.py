@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from functools import cached_property
 from math import degrees, isfinite
 from typing import Any, Literal
@@ -28,6 +27,7 @@ from cmm_uq.analysis.parts.ways import Way
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.certificate.clauses import of_a_part
 from cmm_uq.certificate.origin import NAME, FurtherCertificate, PassedTest, attributes, further_data, passed_data, rows
 from cmm_uq.certificate.sections.regions import (

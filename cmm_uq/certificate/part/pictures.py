@@ -8,7 +8,6 @@ of its points, magnified: where each is expected to be found, and how surely; an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from cmm_uq.analysis.parts.setup import outline
 from cmm_uq.base.messages import NOTHING, Text, after, number, plural, say, sentences, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots import style
 from cmm_uq.certificate.plots.residuals import shown, told

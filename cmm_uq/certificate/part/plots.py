@@ -8,13 +8,13 @@ Correlations between many characteristics, as a picture: a dot for each two, lar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cmm_uq.base.messages import DASH, Text, Verbatim, commas, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Column, Outcome, Paragraph, Plot, Section, section, table
 from cmm_uq.certificate.part.figures import figures_of
 from cmm_uq.certificate.part.measurement import PartMeasurement

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from cmm_uq.base.messages import DASH, NOTHING, Text, commas, names, number, say, semicolons
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.diagnosis.overview import VERDICT_WORDS
 from cmm_uq.certificate.document import Column, Facts, Paragraph, Plot, Section, Standing, section, table
 from cmm_uq.certificate.plots.style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, picture

@@ -16,7 +16,6 @@ import platform
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distributions, version
 from pathlib import Path
@@ -24,6 +23,7 @@ from typing import Any
 from urllib.parse import quote
 
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, foreign, plural, say, semicolons
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.document import Column, Document, Facts, Section, section, table
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.identification import Identification, Laboratory

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from decimal import Decimal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from cmm_uq.base.units import UNITS, Unit, printed_unit
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.reports import ReportResults
 from cmm_uq.jobs.verdicts import Verdicts
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 from asn1crypto import cms, crl, ocsp, x509
@@ -20,6 +19,7 @@ from pyhanko_certvalidator import CertificateValidator, ValidationContext
 from pyhanko_certvalidator.errors import InvalidCertificateError, PathBuildingError, PathValidationError, RevokedError
 
 from cmm_uq.base.messages import Text, Verbatim, commas, day, say
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.sign.found import NOBODY, FileSignature, Revocation, Trust, ran
 from cmm_uq.certificate.sign.signer import is_test, unfit
 

@@ -9,13 +9,13 @@ import io
 import logging
 from collections.abc import Coroutine, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from cmm_uq.base.errors import CmmUqError, NotInstalledError
 from cmm_uq.base.files.limits import KEY_BYTES, content_of
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.values import dataclass, field
 
 if TYPE_CHECKING:
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter

@@ -10,12 +10,12 @@ import datetime as dt
 import io
 import os
 import re
-from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.certificate.sign.found import BROKEN, STAMP_BROKEN, WEAK, FileSignature, Trust, appending, installed, ran
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 

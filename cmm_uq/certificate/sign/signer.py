@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import datetime as dt
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -15,6 +14,7 @@ from urllib.parse import parse_qsl, unquote
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.limits import KEY_BYTES, content_of
 from cmm_uq.base.messages import say
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.certificate.sign.found import installed
 
 if TYPE_CHECKING:

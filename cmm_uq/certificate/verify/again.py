@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.verify.figures import quantities
 from cmm_uq.certificate.verify.given import AGAIN, RESULTS, Given, Inquiry
 from cmm_uq.certificate.verify.opened import read_html

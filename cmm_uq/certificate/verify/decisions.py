@@ -8,7 +8,6 @@ errors (Cantelli's inequality); the figure itself follows from computing again a
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from math import isclose
 from typing import Any
@@ -21,6 +20,7 @@ from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import NOTHING, Verbatim
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.verify.figures import Wrong, inside_of, is_zone
 from cmm_uq.certificate.verify.given import Inquiry
 from cmm_uq.jobs.tables import conformity as table

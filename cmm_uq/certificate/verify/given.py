@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -17,6 +16,7 @@ from cmm_uq.base.files.limits import GIVEN, PDF_BYTES, content_of
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import MANIFEST
 from cmm_uq.base.output.manifest import Manifest, parsed, plain_name
+from cmm_uq.base.values import asdict, dataclass, field
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.verify.opened import HtmlPage, PdfFile, read_html, read_pdf
 from cmm_uq.certificate.verify.texts import plain, strict_json, with_ends

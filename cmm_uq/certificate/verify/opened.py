@@ -14,13 +14,13 @@ import zlib
 from base64 import b64decode
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import HTML_BYTES, HTML_DEPTH, PDF_BYTES, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED, text_of
+from cmm_uq.base.values import dataclass, field
 
 _FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
 

@@ -19,11 +19,11 @@ import math
 import re
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, Self
 
 from cmm_uq.base.files.limits import NUMERAL
+from cmm_uq.base.values import dataclass
 
 VERSION = "3.2.1"  # of the schema that is written
 _MU = "factor=coverageFactor factor; probability=coverageProbability probability; distribution string?"

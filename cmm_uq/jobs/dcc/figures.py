@@ -7,11 +7,11 @@ standard uncertainty or as an interval. Here all are one: a :class:`QuantityFigu
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
 from cmm_uq.base.units import UNITS
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.dcc.certificate import DccQuantity, Element, Measurement, QuantityList, StatementMetadata
 from cmm_uq.jobs.tables.length_formula import divisor_of

@@ -9,12 +9,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.figures import figure, sign_of, unit_of
 from cmm_uq.jobs.importing.factors import LINE, RUN, hint

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import SMALL, figure

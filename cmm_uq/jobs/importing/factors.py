@@ -11,13 +11,13 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
 from cmm_uq.base.points import Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
 LINE, RUN, POINT = "line", "run", "point"

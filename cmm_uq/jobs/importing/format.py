@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache, partial
 from importlib import import_module
@@ -24,6 +23,7 @@ from cmm_uq.base.files.table import Column, JobTable, key
 from cmm_uq.base.messages import Text, Verbatim, commas, say, semicolons
 from cmm_uq.base.plugins import IMPORTS, Plugin, offered
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 import scipy
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.importing import factors
 from cmm_uq.jobs.importing.factors import LINE, POINT, RUN, Counted, Label, codes, counted, fixes, in_turn, together
 from cmm_uq.jobs.importing.format import NotReadError

@@ -12,13 +12,13 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from itertools import pairwise
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, READINGS, REQUIRED
 from cmm_uq.jobs.importing.cells.encodings import is_number
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, NotReadError, Sheet, WrittenUnit, sources_of, unit_named

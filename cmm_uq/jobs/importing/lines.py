@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.messages import Verbatim, say, semicolons
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.cells.figures import unit_elsewhere

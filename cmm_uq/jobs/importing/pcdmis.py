@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.importing.factors import LINE, RUN, Label, codes, counted, hint, run_apart
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.header import printed_words

@@ -6,7 +6,6 @@ import re
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from itertools import islice
 
 import numpy as np
@@ -15,6 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.files.limits import LINE, ROWS
 from cmm_uq.base.messages import Text, Verbatim, number, say
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.importing.cells.encodings import head_text, report_lines
 from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, NotReadError, Row, Sheet, sheets_of
 

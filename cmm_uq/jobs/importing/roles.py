@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Literal
 
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.columns import OPTIONAL
 from cmm_uq.jobs.importing.blocks import DATED, Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import SMALL, unit_of

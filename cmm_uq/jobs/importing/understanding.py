@@ -10,13 +10,13 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
 
 from cmm_uq.base.messages import DASH, Verbatim, commas, names, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.columns import COORDINATES, WHOLE
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.blocks import CutSheet, heading

@@ -13,7 +13,6 @@ import math
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -22,6 +21,7 @@ from pydantic import ValidationError
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.importing.cells.encodings import local
 from cmm_uq.jobs.importing.documents import child, length_unit, three
 from cmm_uq.jobs.importing.format import UNITS, length_named

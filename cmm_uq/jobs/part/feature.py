@@ -12,13 +12,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from cmm_uq.base.files.limits import INPUTS, LISTED
 from cmm_uq.base.files.table import JobTable, Length, Position, Triple, Uncertainty, key, required
+from cmm_uq.base.values import dataclass
 
 _COUNT = re.compile(r"[1-9][0-9]{0,3}")
 FEWEST_UNDULATIONS = 2  # one undulation per revolution is a shift, none a change of size

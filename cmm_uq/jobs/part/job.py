@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,6 +12,7 @@ from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES, text_of
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.part.checks import check_names, check_plan
 from cmm_uq.jobs.part.machine_state import MachineStateFacts

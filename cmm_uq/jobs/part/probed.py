@@ -8,12 +8,12 @@ lobes or waves falls into step with them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.part.feature import FEWEST, ROUND, FeatureFacts, Pattern, Strategy
 
 _GOLDEN = np.pi * (3 - np.sqrt(5))  # rad: by which a Fibonacci lattice turns from point to point

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.files.csv_table import GIVE, CsvTable, cells_of, numbers
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.tables import CalibratedPartFacts, OrientationsFacts, PartFile, Places
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from cmm_uq.base.files.limits import INPUTS, LISTED
 from cmm_uq.base.files.table import JobTable, Length, Limit, Position, Temperature, Triple, Uncertainty, key, required
 from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.part.feature import CharacteristicFacts, Count, Degrees, FeatureFacts, FormFacts, Name
 from cmm_uq.jobs.part.machine_state import MachineStateFacts
 from cmm_uq.jobs.tables.conformity import Declared, Prior, Rule, needs_prior

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeVar
 from xml.etree.ElementTree import Element
@@ -19,6 +18,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.importing.cells.encodings import begins_with, local, report_lines, root_of
 from cmm_uq.jobs.importing.documents import child, three
 from cmm_uq.jobs.importing.format import HEAD, length_named

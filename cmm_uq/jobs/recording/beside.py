@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NoReturn
@@ -23,6 +22,7 @@ from cmm_uq.base.files.csv_table import CsvTable, csv_table
 from cmm_uq.base.files.table import Expansion, JobTable, Length, Limit, key, required
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.importing.recording import read_recording
 from cmm_uq.jobs.tables.artefact import Traceability
 from cmm_uq.jobs.tables.length_formula import Factor, Freedom, with_standard_uncertainty

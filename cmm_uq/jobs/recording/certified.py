@@ -10,7 +10,6 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from typing import Any, get_args
 
@@ -21,6 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import UNITS
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.dcc.figures import QuantityFigures, figures
 from cmm_uq.jobs.importing.documents import Dcc, heading

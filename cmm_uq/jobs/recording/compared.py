@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -28,6 +27,7 @@ from cmm_uq.base.files.limits import MAPS, text_of
 from cmm_uq.base.files.table import AnyFloat, Expansion, JobTable, Length, Names, Uncertainty, key
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, WHOLE, largest
 from cmm_uq.jobs.importing.format import Recognition
 from cmm_uq.jobs.importing.header import COVERAGE

@@ -8,7 +8,6 @@ from __future__ import annotations
 import datetime as dt
 from calendar import monthrange
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from cmm_uq.base.files.table import Column, Expansion, JobTable, Length, key, required
 from cmm_uq.base.messages import Text, commas, day, names, say
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.columns import in_words
 from cmm_uq.jobs.importing.format import FileKeys
 from cmm_uq.jobs.tables.identification import NO_DATE

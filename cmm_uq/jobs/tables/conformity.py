@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
@@ -28,6 +27,7 @@ from cmm_uq.base.files.table import (
     required,
 )
 from cmm_uq.base.messages import Text
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
 from cmm_uq.jobs.tables.length_formula import FLATTEST, Permissible

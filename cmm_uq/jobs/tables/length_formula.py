@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, WrapValidator
 
 from cmm_uq.base.files.table import LARGEST_UM, LONGEST_MM, Divisor, JobTable, Limit, Uncertainty, key
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 
 _NUMBER = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)"
 _FORM = re.compile(

@@ -9,7 +9,6 @@ probabilities are averaged. The random numbers are fixed: the same history gives
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from datetime import date
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -18,6 +17,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.due import drift
 from cmm_uq.laboratory.due.drift_filter import DriftState
 from cmm_uq.laboratory.due.steps import FollowedHistory, followed

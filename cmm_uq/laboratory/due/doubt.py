@@ -11,12 +11,12 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.due.rule import check_standings
 from cmm_uq.laboratory.records.facts import MeasuredPart, RecordedCertificate, RecordedMachine, spelled

@@ -13,7 +13,6 @@ which is what makes one machine's figures comparable with another's: docs/record
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.laboratory.records.facts import Series
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ Gaussian sum, Alspach and Sorenson 1972).
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.laboratory.due import drift
 
 KEPT = 12  # tales kept of a machine at a node

@@ -9,12 +9,12 @@ from __future__ import annotations
 import calendar
 import datetime as dt
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Literal
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, day, foreign, number, say
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.laboratory.due.rule import InterimCheck, Pool, Rule, calibrations, check_standings, months_of
 from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine

@@ -7,7 +7,6 @@ Each machine is judged and estimated with what all the *others* say as its prior
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.due import drift, fleet_model
 from cmm_uq.laboratory.due.crossing import Crossings, crossings

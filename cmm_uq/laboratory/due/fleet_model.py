@@ -9,13 +9,13 @@ solution of linear equations (a hierarchical linear model: Gelman et al. 2013, B
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.due.drift import NAMES, USUAL_RATE_SD, DriftPrior, Histories, learnt_prior, log_density
 from cmm_uq.laboratory.due.drift_filter import DriftStart, DriftState, filtered, log_sum, usual_start
 

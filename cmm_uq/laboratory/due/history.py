@@ -11,7 +11,6 @@ from __future__ import annotations
 import datetime as dt
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, day, plural, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.laboratory.due.doubt import DoubtfulPeriod, doubtful_periods
 from cmm_uq.laboratory.due.rule import ComparedValue, ValueChange, change, common_part, is_of_machine

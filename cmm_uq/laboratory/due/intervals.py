@@ -19,7 +19,6 @@ limits falls to the target. Source: suncal 1.7.1 and its tests, which quote NASA
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -28,6 +27,7 @@ import scipy
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.due import rule as rules
 from cmm_uq.laboratory.due.crossing import FINE, crossings
 from cmm_uq.laboratory.due.drift import HORIZON, YEAR, DriftHistory, DriftPrior, default_prior, history, side_by_side

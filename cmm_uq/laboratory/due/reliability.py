@@ -8,7 +8,6 @@ count; of the others the one with the largest figure of merit is taken.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ import scipy
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 
 _LARGEST = 1e4  # of a parameter: beyond, no model changes any more
 _EXPONENT = 700.0  # of e, within a double's range

@@ -29,12 +29,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from statistics import NormalDist
 from typing import Any, Literal
 
 from cmm_uq.base.messages import Text, plural, say
+from cmm_uq.base.values import dataclass, fields, replace
 from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedValue
 

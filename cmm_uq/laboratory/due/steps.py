@@ -9,11 +9,11 @@ component of the state that is nothing until then (fixed-point smoothing: Anders
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.due import drift
 from cmm_uq.laboratory.due.drift_filter import DriftState, filtered
 

@@ -12,13 +12,13 @@ import json
 import os
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.files.limits import check_file
 from cmm_uq.base.output.staging import synced
+from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.live.instruments.source import Moment
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)

@@ -12,7 +12,6 @@ against that of the stated noise (χ²), or against that of all other set-ups' r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
@@ -23,6 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Row, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES

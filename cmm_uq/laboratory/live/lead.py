@@ -18,7 +18,6 @@ import io
 import queue
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.output.staging import replace_file
 from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.acquired import AcquisitionRecord, as_file, provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.tables.plan import DeclaredSource

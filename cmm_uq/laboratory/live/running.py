@@ -10,7 +10,6 @@ import contextlib
 import queue
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -18,6 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.output import interruption
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, Event, Gap, LiveSource
 from cmm_uq.laboratory.live.screen import SessionView

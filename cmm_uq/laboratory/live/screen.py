@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.base.files.table import LONGEST_MM
 from cmm_uq.base.messages import Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.points import Floats, Machine
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.laboratory.live.lead import Lead, PlannedPoint
 from cmm_uq.laboratory.live.story import NS
 

@@ -18,7 +18,6 @@ import re
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from math import hypot, sqrt
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.output.staging import locked
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.laboratory.live.instruments.source import Moment
 from cmm_uq.laboratory.live.journal import Record, RecordingJournal, opened, refuse_damaged, refused
 

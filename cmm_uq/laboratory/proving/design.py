@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
@@ -13,6 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import Unit
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.laboratory.proving import cases
 from cmm_uq.laboratory.proving.cases import ALLOWED, Case, HiddenEffect, Sensitivity, UnknownCause, remaining_length
 from cmm_uq.machine.model import Noise, RecordingModel

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -24,6 +23,7 @@ from scipy import special
 
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.tables.plan import ProveFacts
 from cmm_uq.jobs.verdicts import AGREES, DIAGNOSES
 from cmm_uq.laboratory.proving.cases import ARTEFACT, KINDS, NOTHING, ONE, OUTSIDE, TWO, Case

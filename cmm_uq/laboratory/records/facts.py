@@ -12,11 +12,11 @@ import json
 import re
 import unicodedata
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.values import dataclass, field
 
 if TYPE_CHECKING:
     import numpy as np

@@ -8,11 +8,11 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, func, or_, select
 
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.verdicts import Verdicts, gravest
 from cmm_uq.laboratory.records.facts import BY_NAME, PART, PERFORMANCE, STANDING, Entry, RecordedMachine, spelled
 from cmm_uq.laboratory.records.place import told

@@ -13,7 +13,6 @@ import re
 import time
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from cmm_uq.base.files.limits import JOB_BYTES, check_file, content_of, text_of
 from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.output import finish_interrupted, sha256_of
 from cmm_uq.base.plugins import told_with_package
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.source import device_name
 from cmm_uq.jobs.tables.identification import is_planned

@@ -14,7 +14,6 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol, get_args
 
@@ -22,6 +21,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, day, plural, say
 from cmm_uq.base.output.manifest import writing_to
 from cmm_uq.base.output.staging import replace_file
+from cmm_uq.base.values import asdict, dataclass
 from cmm_uq.jobs.verdicts import AGREES, Verdicts
 from cmm_uq.laboratory.schedule.state import AHEAD, PRIVATE, Dispatch, FolderState, turn
 

@@ -19,12 +19,12 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
-from dataclasses import dataclass
 from itertools import islice
 from typing import Any, BinaryIO, cast
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import told_with_package
+from cmm_uq.base.values import dataclass
 
 ONE_THREAD = [f"{name}_NUM_THREADS" for name in ("OPENBLAS", "OMP", "MKL", "NUMEXPR")] + ["VECLIB_MAXIMUM_THREADS"]
 

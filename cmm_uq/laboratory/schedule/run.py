@@ -9,12 +9,12 @@ from __future__ import annotations
 import contextlib
 import datetime as dt
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.laboratory.schedule import jobs as states
 from cmm_uq.laboratory.schedule.jobs import JobFolder, JobOutcome, JobReporting, Snapshot, job_folders, quiet_since
 from cmm_uq.laboratory.schedule.notices import Announcement, Delivery, Notice, Outbox, of_error, of_missed

@@ -6,10 +6,11 @@ import datetime as dt
 import shlex
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import PurePath
 from types import MappingProxyType
 from xml.sax.saxutils import escape
+
+from cmm_uq.base.values import dataclass
 
 DAYS = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")  # days of the week, as they are given
 UNIT = "cmm-uq-schedule"  # name of units and task

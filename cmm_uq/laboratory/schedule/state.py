@@ -16,7 +16,6 @@ import logging.handlers
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +23,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError, printable
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.base.output.staging import locked, replace_file
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.source import RESULTS
 from cmm_uq.jobs.verdicts import NONE
 from cmm_uq.laboratory.records.facts import instant

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -21,6 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, foreign, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import Unit, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.geometry.positioning import PositioningRuns
 from cmm_uq.maths.inference.linear_model import Freedoms

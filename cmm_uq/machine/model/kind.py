@@ -10,13 +10,13 @@ What a new job of a kind begins with, so that it can be reported at once and the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 

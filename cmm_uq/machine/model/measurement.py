@@ -11,7 +11,6 @@ exact null space.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, Unit
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.recorded import Noise
 from cmm_uq.machine.physics.effect import Effect

@@ -15,7 +15,6 @@ Known beforehand are also the error maps of a job's machine: what ``[machine] er
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -24,6 +23,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.compared import KEY, Prediction
 from cmm_uq.jobs.tables.machine import ErrorMapFile, SquarenessFacts

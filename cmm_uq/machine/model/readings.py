@@ -18,12 +18,12 @@ carriage does beside its scale (it yaws when it turns round) is other errors.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.tables.machine import SCREW, AxisFacts
 
 Band = tuple[float, float, float]  # periods from, to, mm; amplitude that 95 of 100 do not exceed, µm

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 
 UNIT_MISTAKES = {

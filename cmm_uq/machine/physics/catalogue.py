@@ -12,7 +12,6 @@ import sys
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from importlib.metadata import EntryPoint
 from types import MappingProxyType
@@ -24,6 +23,7 @@ from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.messages import Text, foreign
 from cmm_uq.base.plugins import EFFECTS, BrokenPluginError, Plugin, offered
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.effect import (
     CONTRACT,
     FURTHER as RARER,

@@ -13,7 +13,6 @@ of them, in different attitudes, tell the offset of the mount and the place of t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.compensation import BLOCK, Compensation, PointConditions
 from cmm_uq.machine.physics.kinematics import MOST_LEAN, axis_directions, euler_313, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import LookedUp

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -18,6 +17,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import NOTHING, Argument, Message, Text, Verbatim, fields_of
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import Unit, unit
+from cmm_uq.base.values import dataclass, replace
 
 # blanks in words: the axes, and of the reported amount its size, side and sense, and the size of a second parameter
 _BLANKS = ("axis", "other", "size", "side", "sense", "second")

@@ -12,7 +12,6 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +23,7 @@ from cmm_uq.base.files.csv_table import csv_table, number_problem
 from cmm_uq.base.files.limits import LINE, MAP_BYTES, MAP_ROWS, content_of
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
+from cmm_uq.base.values import dataclass, field, replace
 
 if TYPE_CHECKING:
     from cmm_uq.machine.physics.map_interpolation import MapCovariance

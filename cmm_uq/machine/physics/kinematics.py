@@ -15,7 +15,6 @@ the chain ``YXZ``.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, permutations
 from typing import Literal
@@ -24,6 +23,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.values import dataclass
 
 SQUARENESSES = ("xy", "yz", "zx")  # pairs of axes in the order in which every squareness array here keeps them
 MOST_LEAN = 0.175  # rad, 10°: farther out of square no axis of a machine is believed to be

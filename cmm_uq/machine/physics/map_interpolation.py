@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -29,6 +28,7 @@ from numpy.typing import NDArray
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.error_map import UNITS, AxisErrors, ErrorMap
 from cmm_uq.machine.physics.kinematics import KinematicChain, jacobian
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import csv_table
 from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.map_interpolation import factor_of

@@ -10,13 +10,13 @@ the chain of all changed rows has it. Everything else is added.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.arm import Arm
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.physics import kinematics
 from cmm_uq.machine.physics.effect import ARTEFACT, Effect
 from cmm_uq.machine.physics.effects.joints import OfRows, arm_of

@@ -10,7 +10,6 @@ inscribed, and convexity for circumscribed circles and spheres.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Literal, get_args
 
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.geometry.fits import largest_empty, narrower, narrowest, safe_radius
 from cmm_uq.maths.geometry.minimax import Extremum, least_largest
 from cmm_uq.maths.geometry.placed import BALLS, CYLINDER, LINE, PLANE, SIZED, STRAIGHT, FeatureKind, Placed, placed

@@ -13,7 +13,6 @@ axis from short arcs too, where the principal directions of the points mislead.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.geometry import feature
 from cmm_uq.maths.geometry.feature import Feature, Minimum, cap_directions, minimise, minimum_at, prepared, principal
 

@@ -12,7 +12,6 @@ and the radius move by its least-squares projection on n·δc + δr: a systemati
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 
 State = TypeVar("State")
 MAX_ITERATIONS = 200

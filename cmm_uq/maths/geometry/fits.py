@@ -16,7 +16,6 @@ them do, so that of many points a sample is looked at.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -25,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.geometry import feature
 from cmm_uq.maths.geometry.feature import Feature, Minimum, minimise, minimum_at, prepared, principal
 

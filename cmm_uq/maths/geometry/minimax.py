@@ -21,12 +21,12 @@ holds it, as two opposite points hold a circle about them, the box shrinks until
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 
 if TYPE_CHECKING:
     from cmm_uq.maths.geometry.placed import FeatureShape

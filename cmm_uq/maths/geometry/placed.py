@@ -9,7 +9,6 @@ Shakarji, J. Res. NIST 103 (1998) 633.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.geometry.axial import fit_cone, fit_cylinder
 from cmm_uq.maths.geometry.feature import Feature, centred, frame_about
 from cmm_uq.maths.geometry.fits import fit_circle, fit_line, fit_plane, fit_sphere

@@ -23,11 +23,11 @@ several rounds the largest value is the figure. Deviations are small beside the 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 
 UP, DOWN = 0, 1
 _SAME_MM = 1e-2  # targets nearer than this are one

@@ -9,13 +9,13 @@ in three or four steps. Blocks that fit the processor's cache keep the memory at
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.geometry.association import circumscribed, inscribed as largest_inside, least_zone
 from cmm_uq.maths.geometry.minimax import SCREENED, held, least_zones
 from cmm_uq.maths.geometry.placed import LINE, SIZED, STRAIGHT, FeatureKind, Placed, placed

@@ -18,13 +18,13 @@ that the walkers step from mode to mode as easily as within one.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import scipy
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.inference.ensembles import ENSEMBLES, Progress, run_ensembles
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS

@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ import scipy
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.inference.ensembles import ENSEMBLES, bulk_ess, normal_scores, rhat, split
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.slow import root

@@ -11,7 +11,6 @@ Geostatistics, 7.3). A family shrinks by what observations show of it alone: whe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.maths.inference.linear_model import LeastSquares, LinearModel, reached
 from cmm_uq.maths.inference.marginal import cholesky
 from cmm_uq.maths.inference.noise import Components, Sizes

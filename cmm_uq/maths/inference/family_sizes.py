@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import scipy
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.inference.ensembles import Chains, run_ensembles
 from cmm_uq.maths.inference.families import FieldModel
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal

@@ -16,7 +16,6 @@ small ones, and look as if a normal noise had heavy tails: they are studentised,
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.inference.noise import Components, Sizes
 
 _DEPENDENT = 1e-10  # part of the largest diagonal element below which another counts as zero

@@ -7,12 +7,12 @@ class of observations with equal variance, so that the density at new sizes cost
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel
 from cmm_uq.maths.inference.noise import GROWING, Components, Sizes, slow_variances
 from cmm_uq.maths.inference.slow import SlowFirst, groups, products

@@ -20,13 +20,13 @@ to, but walks on from where it was at the first reading.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import scipy
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field, replace
 
 AXES, PLACING, GROWTH, SLOW = "axes", "placing", "growth", "slow"
 ABSENT = {AXES: 0.5, PLACING: 0.5, GROWTH: 0.8, SLOW: 0.6}  # probability, beforehand, that a component is absent

@@ -10,7 +10,6 @@ none to one, the variance lies between the two, for it is linear in that correla
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.maths.inference.ensembles import BURN_IN, LEAST_EFFECTIVE_SAMPLES, Convergence, Progress, run_ensembles
 from cmm_uq.maths.inference.linear_model import Freedoms, LeastSquares, LinearModel, Unknown
 from cmm_uq.maths.inference.marginal import SIGMA_BOUNDS, Marginal

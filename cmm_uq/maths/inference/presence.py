@@ -12,7 +12,6 @@ the directions of the axes (whose radius and direction they are), and the rate o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -22,6 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.inference import proposals
 from cmm_uq.maths.inference.noise import ABSENT, AXES, GROWTH, PLACING, SLOW, WALK
 from cmm_uq.maths.inference.proposals import LogDensity, Proposal, highest_power, moments, weights

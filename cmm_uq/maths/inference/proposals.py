@@ -7,7 +7,6 @@ different widths, and a mixture is fitted to weighted draws (Cappé et al. 2008,
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 
 Numbers = tuple[NDArray[Any], ...]  # random numbers, of which the first axis are draws
 LogDensity = Callable[[Floats], Floats]  # of (w, d) parameters, up to a constant: (w,)

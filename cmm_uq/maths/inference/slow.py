@@ -10,7 +10,6 @@ that noise make independent of each other, and at new sizes there is nothing to 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from math import copysign, isnan
 
@@ -18,6 +17,7 @@ import numpy as np
 import scipy
 
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 
 _NOTHING = 1e-9  # part of the largest below which a cosine is zero for an observation
 _NONE = 1e-13  # part of the largest below which another column's value is zero

@@ -8,13 +8,13 @@ their weight, whose mean is the probability itself (sequential importance sampli
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 
 _SWEEPS, _SETTLED = 30, 1e-4  # over all components; change of a mean, in standard deviations
 _LOG_DENSITY = -0.5 * np.log(2 * np.pi)

@@ -9,7 +9,6 @@ Readings in groups, as many in each, say what varies within them and what betwee
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from math import copysign, inf, isfinite, sqrt
 from typing import TYPE_CHECKING, Literal
 
@@ -19,6 +18,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, foreign, say, signed
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import unit_as_written
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 from cmm_uq.maths.uncertainty.type_a import coverage_factor
 

@@ -16,7 +16,6 @@ variance. A tail that begins beyond all draws cannot be seen.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import gamma, pi
 
 import numpy as np
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.uncertainty.type_a import check_coverage
 
 _PILOT, _MARGIN = 100_000, 6.0  # draws that say where the tails lie, and standard deviations of that estimate besides

@@ -12,7 +12,6 @@ A shape is a distribution without place and size (JCGM 101:2008 6.4); a bounded 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ import scipy
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field
 
 Number = float | Floats  # or an array (n,) with one entry a point, where only the law of propagation is asked for
 _BISECTIONS = 60

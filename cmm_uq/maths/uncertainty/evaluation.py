@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import astuple, dataclass, field, replace
 from html import escape
 from math import inf
 
@@ -20,6 +19,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, foreign, names, say, semicolons
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import astuple, dataclass, field, replace
 from cmm_uq.maths.uncertainty.budget import NAMES, Budget, Labels, Method, budget_of, joint_line, line_of
 from cmm_uq.maths.uncertainty.coverage import NO_VARIANCE
 from cmm_uq.maths.uncertainty.distributions import constant

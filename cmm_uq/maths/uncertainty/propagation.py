@@ -14,7 +14,6 @@ Everything works at one point or at many: ``...`` is the shape of the points.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +21,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.uncertainty import measurement_model
 from cmm_uq.maths.uncertainty.coverage import Tails, both_intervals, draws_in_tail, tail_of
 from cmm_uq.maths.uncertainty.measurement_model import Derivatives, MeasurementModel

@@ -12,7 +12,6 @@ Science* 14, 382), each taken as normal on either side of its value, as wide as 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, ROUND_UP, Decimal
 from math import ceil, floor, isfinite, isinf, isnan, log10
 
@@ -23,6 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Number
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import Unit
+from cmm_uq.base.values import dataclass
 
 _ALIKE = 0.1  # of the longer side of an interval, by which the other may be shorter: what U says of two digits, 10 ± 1
 

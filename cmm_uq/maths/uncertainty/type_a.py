@@ -20,7 +20,6 @@ and the pair the stated correlation coefficient (Cario and Nelson 1997, "NORmal 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -28,6 +27,7 @@ import scipy
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.maths.uncertainty.distributions import Distribution, normal, student_t
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.noise import NoiseKind
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass
 
 _LEAST_PIVOT = 1e-3  # of a factor of one less what is taken: six digits of sixteen are lost there
 _LARGEST_EXPONENT = 600.0  # of a factor that says how little something counts

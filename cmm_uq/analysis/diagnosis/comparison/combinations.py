@@ -8,7 +8,6 @@ artefact, which was made or calibrated on another machine. Six effects of such a
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +17,7 @@ from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.machine.physics.catalogue import every
 
 # Probability of none, one, two, three and four known effects that the job does not name

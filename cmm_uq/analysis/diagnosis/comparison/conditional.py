@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field
 
 AMPLITUDES = 7
 _SMALLEST = 0.4  # smallest rms of an explanation that is considered, over the noise

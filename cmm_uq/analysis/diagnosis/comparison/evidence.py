@@ -7,7 +7,6 @@ is projected out. What the evidence is conditional on joins the covariance of th
 from __future__ import annotations
 
 from collections.abc import Collection, Container, Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +25,7 @@ from cmm_uq.analysis.diagnosis.comparison.conditional import (
 from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
 from cmm_uq.analysis.diagnosis.noise import OFTEN, NoiseKind
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.model.recorded import Display
 
 _KEPT = 8_000_000  # numbers that are kept of what follows from what was given last

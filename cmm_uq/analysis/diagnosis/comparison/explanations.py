@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
@@ -12,6 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import AXES, Floats, Points, reading_name
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import comb
 
 import numpy as np
@@ -16,6 +15,7 @@ from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
 from cmm_uq.analysis.diagnosis.noise import NoiseKind, probable_tails, tail_precision, with_tails
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass
 
 _ORTHOGONAL = 1e-9  # of the largest square of a row's length, what products of rows that are at right angles come to
 # Of freedom, of Student's t where noise has heavy tails: the fewest that have a variance, and those of the noise's model

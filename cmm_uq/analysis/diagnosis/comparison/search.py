@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -17,6 +16,7 @@ from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fi
 from cmm_uq.analysis.diagnosis.noise import noise_kinds, sigma_grid
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import SMALL_LEAN
 from cmm_uq.machine.model.noise import display_of

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +17,7 @@ from cmm_uq.analysis.diagnosis.held_out import FOLDS, Improvement, held_out_grou
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 
 _SMALLEST = 0.4  # smallest rms of a function that is considered, over the noise
 _FOLLOWED, IMPROBABLE = 40, 1e-3  # versions that a prediction averages, and what a version adds to it at least

@@ -7,7 +7,6 @@ about the most probable nodes it is divided.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
 
@@ -17,6 +16,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_S
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, reading_name
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.columns import in_words
 
 SMOOTH, ROUGH = "smooth", "rough"  # of no form in particular, with a slope everywhere and without

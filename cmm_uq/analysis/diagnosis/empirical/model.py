@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -26,6 +25,7 @@ from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -29,6 +28,7 @@ from numpy.typing import ArrayLike, DTypeLike
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.values import dataclass, field, replace
 
 LARGE = 1000  # points of a feature from which on its points are not drawn one coordinate after the other
 _AT_ONCE = 1000  # rows of a table

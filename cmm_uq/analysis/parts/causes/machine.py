@@ -14,7 +14,6 @@ effective size and offset, and so do not act on the part again. The sphere is pr
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -37,6 +36,7 @@ from cmm_uq.analysis.parts.plan import OWN_COLUMNS, PartPose, Plan, probed
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.field import GivenPeriod
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
 from cmm_uq.machine.physics.superposition import About, Superposition

@@ -14,7 +14,6 @@ one's own. It is common to a measurement, however often each point is read, and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 
 import numpy as np
@@ -24,6 +23,7 @@ from cmm_uq.analysis.parts.plan import PartFeature, PartPose, Plan
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.part.feature import ORIENTED
 from cmm_uq.maths.geometry.feature import frame_about
 

@@ -22,7 +22,6 @@ characteristic. Errors that no orientation changes (the part's form at its point
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -31,6 +30,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine, OneWay, one_way
 from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS, use_by_calibrated_workpiece
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import combinations
 from math import hypot, sqrt
 
@@ -21,6 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, listed, names, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.readings import Repeats, StandardReadings
 from cmm_uq.jobs.part.tables import CalibratedFacts, CalibratedPartFacts, OrientationsFacts

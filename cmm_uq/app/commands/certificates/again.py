@@ -10,7 +10,6 @@ import re
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import cache, partial
 from hashlib import sha256
 from importlib.resources import files as package_files
@@ -29,6 +28,7 @@ from cmm_uq.app.commands.reading import in_language, job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError, NotInstalledError, OutputError
 from cmm_uq.base.languages.translation import ENGLISH, code_of
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platform
 from cmm_uq.certificate.verify import views

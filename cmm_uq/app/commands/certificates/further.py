@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -27,6 +26,7 @@ from cmm_uq.app.commands.estimation import doubt_of, with_noise
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, after, day, number, say
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificate, FurtherCertificates, PassedTest
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.machine_state import PassedFacts

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +18,7 @@ from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say, semicolons
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.units import UNITS, printed_unit
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.results.provenance import KEY, ChangedFigure, Reissue
 from cmm_uq.certificate.wording import OUTCOME_WORDS, with_uncertainty

@@ -8,7 +8,6 @@ import io
 import os
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.files.limits import SIGNED_BYTES, check_file, content_of
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.output import Owner, finish_interrupted, read_manifest, staged
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate import sign
 from cmm_uq.certificate.sign.signer import SCHEME, signer_of_token
 from cmm_uq.laboratory.schedule import settings as credentials

@@ -9,13 +9,13 @@ what takes part in the computation is installed here.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import WORDS
 from cmm_uq.certificate.verify import given as files, sources, views
 from cmm_uq.certificate.verify.given import AGAIN, NOT_ASKED, RESULTS, Given, Inquiry

@@ -9,7 +9,6 @@ import contextlib
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.clauses import Requirement, certifies, clauses, contradictions, missing
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import is_own, read_recording

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +17,7 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.rotary import RotaryMachine
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.job import Job

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256

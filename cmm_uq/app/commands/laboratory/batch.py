@@ -12,7 +12,6 @@ import shlex
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import closing
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +24,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.output import interruption, read_manifest, sha256_of, staged
 from cmm_uq.base.output.manifest import journal_for
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.source import sha256
 from cmm_uq.laboratory.records.place import NONE

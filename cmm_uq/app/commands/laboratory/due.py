@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -16,6 +15,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.laboratory.due.doubt import parts_measured, with_parts
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history

@@ -6,7 +6,6 @@ import contextlib
 import datetime as dt
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from cmm_uq.app.commands.reading import job_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of as whole_file
 from cmm_uq.base.output import MANIFEST, finish_interrupted, interruption, read_manifest, sha256_of
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob, part_of
 from cmm_uq.jobs.source import RESULTS

@@ -9,7 +9,6 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +21,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError, suggestion
 from cmm_uq.base.messages import Verbatim, plural, say
 from cmm_uq.base.output.interruption import keeping
 from cmm_uq.base.output.manifest import write_new
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.laboratory.due.history import machine_history

@@ -10,7 +10,6 @@ import datetime as dt
 import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.messages import NOTHING, Text, commas, plural, say, semicolons, sentences
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.part.measurement import FurtherSetUps, UnseenError
 from cmm_uq.certificate.wording import titles
 from cmm_uq.jobs.job import Job

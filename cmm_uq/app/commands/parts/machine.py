@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -32,6 +31,7 @@ from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, say
 from cmm_uq.base.points import AXES, Floats, Machine
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.clauses import draft
 from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
 from cmm_uq.certificate.sections.agreement import against_certificate

@@ -9,7 +9,6 @@ import datetime as dt
 import json
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -21,6 +20,7 @@ from cmm_uq.app.commands.reading import unwritten
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.files.toml_file import as_toml, nested
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.importing.cells.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.part.checks import freedoms, members, unfit

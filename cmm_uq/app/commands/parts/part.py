@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,6 +45,7 @@ from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.part.figures import part_summary
 from cmm_uq.certificate.part.measurement import MATTERS, CertificateStatus, PartMeasurement, UnseenError

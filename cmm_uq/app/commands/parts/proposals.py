@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from cmm_uq.artefacts.spheres.sphere import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, number, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model.artefact import Artefact

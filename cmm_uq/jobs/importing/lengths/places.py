@@ -9,12 +9,12 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 
 START, END, DIRECTION, CENTRE, TOWARDS = "start", "end", "direction", "centre", "towards"

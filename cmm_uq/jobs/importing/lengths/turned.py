@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.importing.blocks import CutSheet
 from cmm_uq.jobs.importing.factors import LINE, RUN, hint
 from cmm_uq.jobs.importing.format import Cell, Sheet

@@ -11,10 +11,10 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import count
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.live.instruments.parsing import Framer
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame
 from cmm_uq.laboratory.live.instruments.source import Clock, Port

@@ -11,8 +11,8 @@ import select
 import socket
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.laboratory.live.instruments import ipp_client as ipp
 from cmm_uq.laboratory.live.instruments.parsing import Framer
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -18,6 +17,7 @@ from cmm_uq.base.files.limits import JOB_BYTES, TEXT, content_of
 from cmm_uq.base.files.table import unit_of
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.parsing import check_profile, check_unit
 from cmm_uq.laboratory.live.instruments.profile import NUMBER, ProfileFile, ProfileQuantity, Send, bytes_of, shown

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from math import isclose, isfinite
 from types import MappingProxyType
@@ -14,6 +13,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.table import unit_of
 from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.units import pint_units
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.laboratory.live.instruments import profile as profiles
 
 

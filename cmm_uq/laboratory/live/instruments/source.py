@@ -15,7 +15,6 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, cast
 from urllib.parse import parse_qs
@@ -23,6 +22,7 @@ from urllib.parse import parse_qs
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import check_file
 from cmm_uq.base.messages import Text
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.laboratory.live.instruments.profile import Connection
 
 if TYPE_CHECKING:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 
 from cmm_uq.base.messages import NOTHING, Text
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.effect import CONTRACT, Effect, Family, Nonparametric, Parameter, Shape
 
 # of points, the two letters of the effect, and its shape: basis (n, 3, k), mm

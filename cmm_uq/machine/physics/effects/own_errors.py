@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -18,6 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.values import dataclass
 from cmm_uq.machine.physics.effect import OWN, PRIOR_WEIGHT, CommonSize, Effect, Nonparametric, Parameter
 from cmm_uq.machine.physics.effects.drives import CURVATURE
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS

@@ -24,7 +24,6 @@ successors of Edlén's equation of 1966 keep its form with new constants. They k
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -33,6 +32,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
+from cmm_uq.base.values import dataclass, field
 from cmm_uq.maths.uncertainty.budget import Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution, Number, constant, normal, rectangular
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel

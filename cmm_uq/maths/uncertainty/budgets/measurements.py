@@ -15,7 +15,6 @@ what second order or Monte Carlo keeps (JCGM 100:2008 H.1.7): evaluate these mod
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from math import inf, sqrt
 from typing import Any
 
@@ -25,6 +24,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
+from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, Budget, BudgetLine, joint_line
 from cmm_uq.maths.uncertainty.distributions import Distribution, constant
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel

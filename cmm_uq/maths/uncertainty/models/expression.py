@@ -12,7 +12,6 @@ import re
 import unicodedata
 import warnings
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from operator import pow as power
 from typing import Any, Literal
 
@@ -20,6 +19,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.limits import NUMERAL, TEXT
+from cmm_uq.base.values import dataclass
 
 FUNCTIONS: Mapping[str, np.ufunc] = {
     **{name: getattr(np, name) for name in ("sqrt", "exp", "log", "log10", "sin", "cos", "tan")},

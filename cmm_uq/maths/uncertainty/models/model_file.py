@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -22,6 +21,7 @@ from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT, content_o
 from cmm_uq.base.files.table import JobTable, key, required
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution
 from cmm_uq.maths.uncertainty.evaluation import METHODS, Evaluation, Request, evaluate

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, field, fields
 from inspect import Parameter, signature
 from pathlib import Path
 from types import MappingProxyType
@@ -19,6 +18,7 @@ from pydantic import create_model
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.messages import Text, Verbatim, number, say
+from cmm_uq.base.values import MISSING, dataclass, field, fields
 from cmm_uq.maths.uncertainty.air.state import Air, Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
 from cmm_uq.maths.uncertainty.budgets.measurements import UNITS, length_at_20, scale_error, triangle_angles

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.uncertainty import distributions as known, propagation
 from cmm_uq.maths.uncertainty.coverage import elliptical_factor
 from cmm_uq.maths.uncertainty.distributions import Distribution, arcsine, normal, rectangular, student_t

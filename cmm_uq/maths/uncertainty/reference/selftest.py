@@ -6,12 +6,12 @@ Beside those of :mod:`~cmm_uq.maths.uncertainty.reference.jcgm`: the refractive 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from cmm_uq.base.values import dataclass
 from cmm_uq.maths.uncertainty.air import state as air
 from cmm_uq.maths.uncertainty.budgets.measurements import harris_compensated, harris_uncompensated, sphere_covariance
 from cmm_uq.maths.uncertainty.measurement_model import derivatives
