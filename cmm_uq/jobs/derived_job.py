@@ -235,7 +235,7 @@ class Truth(JobTable):
     """True parameters of each effect that acts, by the effect's name, whatever the job's model names."""
     artefact: dict[str, AnyFloat] = {}
     """True sizes of the artefact, by name, such as `length_mm`; as certified by default."""
-    noise: NoiseFacts = key(NoiseFacts(), "Noise of the simulated readings.")
+    noise: NoiseFacts = NoiseFacts.left_out("Noise of the simulated readings.")
     columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
     """Columns of the recording at a value that holds for every row, such as temperatures."""
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = key(0, "Seed of the random numbers.")

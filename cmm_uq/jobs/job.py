@@ -127,7 +127,7 @@ class JobFile(JobTable):
     """All of job.toml. A job of a kind without a recording has no ``[recording]``."""
 
     job: JobFacts = required("Identification, and free text for the certificate.")
-    laboratory: Laboratory = key(Laboratory(), "Who answers for the certificate.")
+    laboratory: Laboratory = Laboratory.left_out("Who answers for the certificate.")
     machine: MachineFacts = required("The machine that was measured.")
     artefact: ArtefactFacts = required("The artefact that it was measured with, or the kind of measurement.")
     recording: RecordingFacts = required("What was recorded, and in which file.")
@@ -137,19 +137,19 @@ class JobFile(JobTable):
     """The thermometers that recorded temperatures were read from, each a table of its own with its certificate."""
     simulation: SimulationFacts | None = None
     """A prediction of another program, or an error map, that the recording is diagnosed against."""
-    probe: ProbeFacts = key(ProbeFacts(), "With what the recording was made.")
-    test_uncertainty: TestUncertainty = TestUncertainty()
+    probe: ProbeFacts = ProbeFacts.left_out("With what the recording was made.")
+    test_uncertainty: TestUncertainty = TestUncertainty.left_out()
     """What a test value is uncertain by beside the calibration of the artefact (ISO/TS 23165)."""
-    rated_conditions: RatedConditions = RatedConditions()
+    rated_conditions: RatedConditions = RatedConditions.left_out()
     """Conditions under which the limits of the machine hold, by its data sheet."""
     model: ModelFacts = required("The physics that the simulation is told about.")
     effect: Annotated[list[EffectFacts], Field(max_length=STATED.most)] = []
     """Physics of your own, each a formula with its parameters: named in `[model] effects`, or a candidate of the diagnosis."""
     conformity: Annotated[list[ConformityFacts], Field(max_length=CONFORMITY.most)] = []
     """Statements of conformity: a standard, a limit and a rule each."""
-    plan: PlanFacts = key(PlanFacts(), "What may be measured, where, and what it should tell; read by `cmm-uq plan`.")
-    acquire: AcquireFacts = key(AcquireFacts(), "The instruments that the recording is taken from live.")
-    prove: ProveFacts = ProveFacts()
+    plan: PlanFacts = PlanFacts.left_out("What may be measured, where, and what it should tell; read by `cmm-uq plan`.")
+    acquire: AcquireFacts = AcquireFacts.left_out("The instruments that the recording is taken from live.")
+    prove: ProveFacts = ProveFacts.left_out()
     """By which figures the diagnosis is accepted on these set-ups; read by `cmm-uq prove`."""
 
     @field_validator("conformity")

@@ -95,7 +95,7 @@ class AsFound(ResultsFile):
     conformity: list[ConformityDecision] = []
     tolerances: dict[str, dict[str, float | str]] = {}
     verdicts: dict[str, Any] | None = None
-    identifiability: _Identifiability = _Identifiability()
+    identifiability: _Identifiability = _Identifiability.model_construct()
 
     @property
     def stated(self) -> Verdicts:
@@ -208,7 +208,7 @@ class ReportResults(ResultsFile):
     estimates: dict[str, dict[str, EstimateFigure]] = {}
     tolerances: dict[str, dict[str, float | str]] = {}
     verdicts: dict[str, Any] | None = None
-    identifiability: _Identifiability = _Identifiability()
+    identifiability: _Identifiability = _Identifiability.model_construct()
 
 
 _CALIBRATION = "Name the results.json that cmm-uq report wrote of a job of kind digitizer"

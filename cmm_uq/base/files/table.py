@@ -36,6 +36,12 @@ class JobTable(BaseModel):
             raise ValueError(problem)
         return self
 
+    @classmethod
+    def left_out(cls, sentence: str | None = None) -> Self:
+        """The key of a table that need not be there, with its sentence; what checks it is not made for that."""
+        field: Any = Field(cls.model_construct(), description=sentence)
+        return field
+
     def problems(self) -> Iterable[str]:
         """What keys say that do not go together; the first is told."""
         return ()

@@ -65,7 +65,7 @@ class MachineStateFacts(JobTable):
     """In place of a certificate the folder of the machine's job, from this job's folder on; it is analysed anew."""
     valid_until: dt.date | None = None
     """Last day on which the certificate holds; where it is left out, the day that it names for the next calibration."""
-    travel_mm: Travel = Travel()
+    travel_mm: Travel = Travel.left_out()
     """Lowest and highest scale reading of each axis; as the certificate says where left out. A part outside is refused."""
     chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
     """Carriages from the table to the ram, with F for the frame where the workpiece moves; as the certificate says where it is

@@ -266,23 +266,23 @@ class PartFile(JobTable):
     """All of a part's job.toml."""
 
     job: PartJobFacts = required("Identification, and free text for the certificate.")
-    laboratory: Laboratory = key(Laboratory(), "Who answers for the certificate.")
+    laboratory: Laboratory = Laboratory.left_out("Who answers for the certificate.")
     part: PartFacts = required("What is measured.")
     machine_state: MachineStateFacts = required("The machine as its certificate states it.")
     stylus: Annotated[list[StylusFacts], Field(min_length=1, max_length=INPUTS.most)]
     """Styli that probe it, and what their qualification left uncertain."""
     feature: Annotated[list[FeatureFacts], Field(min_length=1, max_length=INPUTS.most)]
     """Features: where they are meant to be, and where they are probed."""
-    alignment: AlignmentFacts = key(AlignmentFacts(), "How coordinates of the part follow from measured points.")
-    placing: PlacingFacts = key(PlacingFacts(), "Where the part lies in the machine.")
-    probing: ProbingFacts = key(ProbingFacts(), "In which order, how fast and how often the points are probed.")
-    environment: EnvironmentFacts = EnvironmentFacts()
+    alignment: AlignmentFacts = AlignmentFacts.left_out("How coordinates of the part follow from measured points.")
+    placing: PlacingFacts = PlacingFacts.left_out("Where the part lies in the machine.")
+    probing: ProbingFacts = ProbingFacts.left_out("In which order, how fast and how often the points are probed.")
+    environment: EnvironmentFacts = EnvironmentFacts.left_out()
     """Temperatures while the part is measured, and what is known of them."""
-    form: FormFacts = key(FormFacts(), "The part's own form and roughness, between the points that are probed.")
-    negligible: NegligibleCauses = key(NegligibleCauses(), "Causes that are declared negligible, by whom and why.")
+    form: FormFacts = FormFacts.left_out("The part's own form and roughness, between the points that are probed.")
+    negligible: NegligibleCauses = NegligibleCauses.left_out("Causes that are declared negligible, by whom and why.")
     characteristic: Annotated[list[CharacteristicFacts], Field(min_length=1, max_length=INPUTS.most)]
     """What the drawing asks for."""
-    decision: DecisionFacts = key(DecisionFacts(), "By which rule conformity with the drawing is decided.")
+    decision: DecisionFacts = DecisionFacts.left_out("By which rule conformity with the drawing is decided.")
     recording: MeasuredFacts | None = None
     """The points as they were measured; without them there are uncertainties alone."""
     by_calibrated_part: CalibratedPartFacts | None = None

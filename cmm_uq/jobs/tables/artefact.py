@@ -128,7 +128,7 @@ class ThermometerFacts(JobTable):
     """Columns of the recording that it gave."""
     name: str = key("", "Name of the thermometer on the certificate.")
     serial: str = key("", "Serial number of the thermometer.")
-    certificate: Traceability = key(Traceability(), "The thermometer's own certificate.")
+    certificate: Traceability = Traceability.left_out("The thermometer's own certificate.")
 
     def called(self, columns: Iterable[str]) -> Text:
         """By its name and serial number, or by the columns of a recording that it gave."""

@@ -133,8 +133,8 @@ class TestUncertainty(JobTable):
     u_repeat_arcsec: Uncertainty = key(
         0.0, "Of angles of a rotary axis, or of orientation: what changes between readings."
     )
-    negligible: NegligibleLines = key(NegligibleLines(), "Lines that are declared negligible, by whom and why.")
-    machine: MachineLines = key(MachineLines(), "Lines that are declared the machine's own, by whom and why.")
+    negligible: NegligibleLines = NegligibleLines.left_out("Lines that are declared negligible, by whom and why.")
+    machine: MachineLines = MachineLines.left_out("Lines that are declared the machine's own, by whom and why.")
 
     def problems(self) -> Iterator[str]:
         for line, stated in (*LINE_KEYS.items(), *ANGULAR_KEYS.items()):

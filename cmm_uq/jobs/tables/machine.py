@@ -259,15 +259,15 @@ class MachineFacts(JobTable):
     """Carriages from the table to the ram, with F for the frame where the workpiece moves; behind a hyphen the rotary axes of
     a head, from the ram to the probe, such as `XYZ-CA`; behind a bar the rotary tables that the workpiece stands on, from
     the bed, such as `XYZ|C`, or `XYZ|AC` with C on A."""
-    table: RotaryTableFacts = key(RotaryTableFacts(), "The rotary table of the chain.")
+    table: RotaryTableFacts = RotaryTableFacts.left_out("The rotary table of the chain.")
     rotary: Annotated[list[RotaryFacts], Field(max_length=3)] = key(
         [], "The rotary axes of a chain with several, or with a head."
     )
-    head: HeadFacts = key(HeadFacts(), "The head that turns the probe.")
+    head: HeadFacts = HeadFacts.left_out("The head that turns the probe.")
     joint: Annotated[list[JointFacts], Field(max_length=MOST_JOINTS)] = []
     """Joints of an arm, or of a robot, from the base to the flange, in place of carriages."""
-    arm: ArmFacts = key(ArmFacts(), "What holds for all joints, and the tool.")
-    travel_mm: Travel = key(Travel(), "Lowest and highest scale reading of each axis.")
+    arm: ArmFacts = ArmFacts.left_out("What holds for all joints, and the tool.")
+    travel_mm: Travel = Travel.left_out("Lowest and highest scale reading of each axis.")
     origin_mm: Triple = [0.0, 0.0, 0.0]
     """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
     axes: AxesFacts = key([], "How axes are read: what is known beforehand of their periodic errors and play.")

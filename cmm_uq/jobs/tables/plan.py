@@ -112,8 +112,8 @@ class PlanFacts(JobTable):
     volume_mm: dict[Literal["x", "y", "z"], Range] = {}
     """Scale readings that points may have; the machine's travel, else the recorded range."""
     margin_mm: Annotated[float, Field(ge=0, le=1e6)] = key(10.0, "Kept free at each end of that range.")
-    fixtures: FixtureFacts = key(FixtureFacts(), "How the artefact may stand.")
-    poses: PosesFacts = key(PosesFacts(), "What stands in the way of an arm, and of the beam of a tracker.")
+    fixtures: FixtureFacts = FixtureFacts.left_out("How the artefact may stand.")
+    poses: PosesFacts = PosesFacts.left_out("What stands in the way of an arm, and of the beam of a tracker.")
     length_mm: Length | None = key(None, "Length of an artefact that is not certified, roughly.")
     lengths_mm: Annotated[list[Length], Field(max_length=LISTED.most)] = []
     """Distances of a gauge's faces from the first, or lengths of blocks."""
