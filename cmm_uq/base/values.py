@@ -26,14 +26,21 @@ def _with_methods(cls: type, *, eq: bool = True, frozen: bool = False, **kinds: 
     if kinds.get("slots"):
         return dataclasses.dataclass(eq=eq, frozen=frozen, **kinds)(cls)
     cls.__doc__ = cls.__doc__ or cls.__name__  # or it would be made of the signature
-    own = set(vars(cls))
-    shown = kinds.pop("repr", True)
+    own, shown = set(vars(cls)), kinds.pop("repr", True)
     dataclasses.dataclass(init=False, repr=False, eq=False, **kinds)(cls)
-    methods: dict[str, object] = {"__init__": _compiled_when_called(cls, frozen=frozen)}
-    if shown:
-        methods["__repr__"] = _repr
+    names = [one.name for one in fields(cls) if one.compare]
+    values: Any = attrgetter(*names) if len(names) > 1 else lambda self: tuple(getattr(self, name) for name in names)
+
+    def compiled_when_called(self: object, /, *values: object, **named: object) -> None:
+        cls.__init__ = compiled = _compiled(cls, frozen=frozen)  # type: ignore[misc]
+        compiled(self, *values, **named)
+
+    def equal(self: object, other: object) -> bool:
+        return values(self) == values(other) if other.__class__ is self.__class__ else NotImplemented
+
+    methods: dict[str, object] = {"__init__": compiled_when_called, **({"__repr__": _repr} if shown else {})}
     if eq:
-        methods |= _comparison(cls, hashed=frozen)
+        methods |= {"__eq__": equal, "__hash__": (lambda self: hash(values(self))) if frozen else None}
     if frozen:
         methods |= {"__setattr__": _refuse_change, "__delattr__": _refuse_change}
     for name, method in methods.items():
@@ -42,18 +49,10 @@ def _with_methods(cls: type, *, eq: bool = True, frozen: bool = False, **kinds: 
     return cls
 
 
-def _compiled_when_called(cls: Any, *, frozen: bool) -> Callable[..., None]:
-    def first(self: object, /, *values: object, **named: object) -> None:
-        cls.__init__ = compiled = _compiled(cls, frozen=frozen)
-        compiled(self, *values, **named)
-
-    return first
-
-
 def _compiled(cls: type, *, frozen: bool) -> Callable[..., None]:
     """A function that takes the fields and stores them."""
     known: dict[str, Any] = {"_put": object.__setattr__}
-    taken, taken_by_name, lines = list[str](), list[str](), list[str]()
+    taken, taken_by_name, lines = ["self"], list[str](), list[str]()
     for one in fields(cls):
         name, value, factory = one.name, one.name, one.default_factory is not MISSING
         if one.init:
@@ -65,21 +64,11 @@ def _compiled(cls: type, *, frozen: bool) -> Callable[..., None]:
             value = f"_new_{name}() if {name} is _default_{name} else {name}" if one.init else f"_new_{name}()"
         if one.init or factory:
             lines.append(f"_put(self, {name!r}, {value})" if frozen else f"self.{name} = {value}")
-    lines += ["self.__post_init__()"] if hasattr(cls, "__post_init__") else []
-    arguments = ", ".join(["self", *taken, *(["*", *taken_by_name] if taken_by_name else [])])
-    exec(f"def __init__({arguments}):\n " + "\n ".join(lines or ["pass"]), known)  # noqa: S102 - of names of fields
+    lines.append("self.__post_init__()" if hasattr(cls, "__post_init__") else "pass")
+    arguments = ", ".join([*taken, *(["*", *taken_by_name] if taken_by_name else [])])
+    exec(f"def __init__({arguments}):\n " + "\n ".join(lines), known)  # noqa: S102 - of names of fields
     known["__init__"].__qualname__ = f"{cls.__qualname__}.__init__"
     return known["__init__"]  # type: ignore[no-any-return]
-
-
-def _comparison(cls: type, *, hashed: bool) -> dict[str, object]:
-    names = [one.name for one in fields(cls) if one.compare]
-    values: Any = attrgetter(*names) if len(names) > 1 else lambda self: tuple(getattr(self, name) for name in names)
-
-    def equal(self: object, other: object) -> bool:
-        return values(self) == values(other) if other.__class__ is self.__class__ else NotImplemented
-
-    return {"__eq__": equal, "__hash__": (lambda self: hash(values(self))) if hashed else None}
 
 
 @recursive_repr()

@@ -26,12 +26,7 @@ from cmm_uq.analysis.conformity.standard import (
     length_unstated,
 )
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Statement
-from cmm_uq.analysis.conformity.uncertainty import (
-    FORM_LINES,
-    LENGTH_LINES,
-    SIZE_LINES,
-    causes_of_lengths,
-)
+from cmm_uq.analysis.conformity.uncertainty import FORM_LINES, LENGTH_LINES, SIZE_LINES, causes_of_lengths
 from cmm_uq.base.arm import Arm
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Points
@@ -123,10 +118,7 @@ def oriented(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
         orientations=ORIENTATIONS,
         points=ORIENTED_POINTS,
     )
-    return (
-        _two_places(artefact, what, ORIENTATIONS, ORIENTED_POINTS, recorded=recorded),
-        _reach(artefact)[1],
-    )
+    return (_two_places(artefact, what, ORIENTATIONS, ORIENTED_POINTS, recorded=recorded), _reach(artefact)[1])
 
 
 def seats(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:

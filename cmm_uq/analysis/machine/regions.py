@@ -24,14 +24,7 @@ from itertools import product
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.held_out import with_quantities
-from cmm_uq.analysis.machine.agreement import (
-    Agreement,
-    Key,
-    RecordedDraws,
-    held_together,
-    of_factors,
-    of_lengths,
-)
+from cmm_uq.analysis.machine.agreement import Agreement, Key, RecordedDraws, held_together, of_factors, of_lengths
 from cmm_uq.analysis.machine.conditional import RecordedField, as_recorded_allows, doubted_draws, stated_noise
 from cmm_uq.analysis.machine.performance import (
     MachinePerformance,

@@ -23,8 +23,8 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.measurement import RecordingModel
+from cmm_uq.machine.physics.compensation import RotaryErrors, of_axes
 from cmm_uq.machine.physics.effects.rotary import EFFECTS, OfRotary, RotaryFunction
-from cmm_uq.machine.physics.rotary_errors import RotaryErrors, of_axes
 from cmm_uq.machine.physics.superposition import About
 from cmm_uq.maths.inference.posterior import Doubt, NoisyPosterior
 

@@ -33,7 +33,7 @@ from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_states import HARMONICS, harmonics, turned_back
 from cmm_uq.maths.geometry import fit_sphere
-from cmm_uq.maths.geometry.enclosing import enclosing_diameter
+from cmm_uq.maths.geometry.fits import enclosing_diameter
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 _OF_FORM = (*HARMONICS, *((6, order) for order in range(-6, 7)))  # probes have two to six lobes

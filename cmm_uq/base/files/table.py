@@ -16,7 +16,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from functools import cache
 from itertools import pairwise
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar, cast
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -39,8 +39,7 @@ class JobTable(BaseModel):
     @classmethod
     def left_out(cls, sentence: str | None = None) -> Self:
         """The key of a table that need not be there, with its sentence; what checks it is not made for that."""
-        field: Any = Field(cls.model_construct(), description=sentence)
-        return field
+        return cast("Self", Field(cls.model_construct(), description=sentence))
 
     def problems(self) -> Iterable[str]:
         """What keys say that do not go together; the first is told."""

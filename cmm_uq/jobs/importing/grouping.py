@@ -303,11 +303,7 @@ def _told(way: Grouping, found: Sequence[Counted], xyz: Floats, labels: Sequence
             return None
         if pairs:
             (one, run), *_ = pairs
-            named, measurement, at = (
-                [*named, one[0].values],
-                together(measurement, one[1]),
-                together(one[1], at),
-            )
+            named, measurement, at = ([*named, one[0].values], together(measurement, one[1]), together(one[1], at))
     if (turn := next((f[0].words for f in (way.of, run) if f and _ANGLE.search(f[0].words)), None)) is not None:
         what = f"places come again at each {turn.strip()!r}, which may be of a table that turned"
         raise NotReadError(what, fix="Write a recording with it as c_deg: docs/reference/columns.md")

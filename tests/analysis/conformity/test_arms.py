@@ -21,7 +21,7 @@ from cmm_uq.base.arm import Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.maths.geometry.enclosing import enclosing_diameter
+from cmm_uq.maths.geometry.fits import enclosing_diameter
 from tests.analysis.conformity.arms_by_hand import ARMS, TETRAHEDRON
 from tests.jobs.test_reading import edit
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.machine.conditional import RecordedField, given_recording, white
-from cmm_uq.analysis.machine.foreseen import EACH, foreseen
 from cmm_uq.analysis.machine.recordings import FurtherRecording, FurtherRecordings
 from cmm_uq.analysis.machine.state import MachineState, Unmodelled
+from cmm_uq.analysis.parts.foreseen import EACH, foreseen
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.physics.catalogue import effects

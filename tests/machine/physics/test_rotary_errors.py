@@ -8,9 +8,8 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.catalogue import EVERY, effects
-from cmm_uq.machine.physics.compensation import compensate_points
+from cmm_uq.machine.physics.compensation import RotaryErrors, blocks, compensate_points, parse_rotary_errors
 from cmm_uq.machine.physics.map_interpolation import factor_file
-from cmm_uq.machine.physics.rotary_errors import RotaryErrors, blocks, parse_rotary_errors
 from tests.machine.physics.test_rotary import OF_AXES, ON_TABLE, erring, matrix, points, turn
 
 NONE = np.zeros(3)

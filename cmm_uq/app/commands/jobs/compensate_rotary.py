@@ -25,7 +25,15 @@ from cmm_uq.jobs.machines import in_coordinates
 from cmm_uq.jobs.source import sha256
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.predicted_errors import maps_of
-from cmm_uq.machine.physics.compensation import Compensation, circumstances, compensate_points, machine_compensation
+from cmm_uq.machine.physics.compensation import (
+    Compensation,
+    RotaryErrors,
+    blocks,
+    circumstances,
+    compensate_points,
+    machine_compensation,
+    parse_rotary_errors,
+)
 from cmm_uq.machine.physics.map_interpolation import (
     Beyond,
     ErrorMaps,
@@ -35,7 +43,6 @@ from cmm_uq.machine.physics.map_interpolation import (
     uncertain_map,
 )
 from cmm_uq.machine.physics.point_cloud import COORDINATES
-from cmm_uq.machine.physics.rotary_errors import RotaryErrors, blocks, parse_rotary_errors
 from cmm_uq.machine.physics.stated import physics_of
 
 ROTARY_FILES = ERRORS, COVARIANCE, KEYS = "rotary-errors.csv", "rotary-errors-covariance.npy", "rotary-errors.toml"

@@ -126,13 +126,7 @@ class Batch:
 class BatchRun:
     """One batch on its way: what came of it so far, with the ``records`` that each report is recorded in."""
 
-    def __init__(
-        self,
-        listed: list[batch_jobs.BatchJob],
-        options: BatchOptions,
-        batch: Batch,
-        tell: Stage,
-    ) -> None:
+    def __init__(self, listed: list[batch_jobs.BatchJob], options: BatchOptions, batch: Batch, tell: Stage) -> None:
         self.listed, self.options, self.batch = listed, options, batch
         self.records: Records | None = None
         self.there = bytearray(len(listed))
