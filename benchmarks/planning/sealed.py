@@ -22,14 +22,8 @@ from settings import SETTINGS
 from cmm_uq.analysis.diagnosis.asserted import indistinguishable
 from cmm_uq.analysis.diagnosis.comparison.search import search
 from cmm_uq.analysis.diagnosis.power import powers, without_fault
-from cmm_uq.analysis.planning.candidates import (
-    candidates,
-    choose,
-    ready_plan,
-    recording_information,
-    score_of,
-    set_up_information,
-)
+from cmm_uq.analysis.planning.candidates import candidates, ready_plan, recording_information, set_up_information
+from cmm_uq.analysis.planning.exchange import choose, score_of
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError

@@ -7,7 +7,8 @@ import time
 import numpy as np
 from settings import MACHINE, SIX, setting
 
-from cmm_uq.analysis.planning.candidates import CRITERIA, candidates, choose, score_of, set_up_information
+from cmm_uq.analysis.planning.candidates import candidates, set_up_information
+from cmm_uq.analysis.planning.exchange import CRITERIA, choose, score_of
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_facts
 

@@ -12,11 +12,12 @@ from functools import cached_property
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import CombinationPrior
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, draw_nothing, statistic_of
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, draw_nothing, log_prior, statistic_of
 from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
@@ -36,6 +37,7 @@ _TAIL = 0.2
 CERTAIN = float(np.log(0.95 / 0.05))
 _TOGETHER = 5  # effects whose recordings are judged together
 _UNASKED = -1e300  # margin at a size that is smaller than what is asked
+_ROUNDING = 1e-6  # of a margin
 ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned with
 
 
@@ -225,25 +227,89 @@ class _Rule:
     def reached(self, tried: Sequence[tuple[Floats, Floats, int]], quantile: float) -> Iterator[tuple[Floats, Floats]]:
         """Sizes (d,) from which on recordings are alarmed, and named, of noise (m, d), a direction (m, 1) and its effect each.
 
-        From the largest size down: to where a recording is not alarmed, or no more than a quantile of them are.
+        From the largest size down, to where a recording is not, or no more than a quantile of an effect's are.
         """
         if not tried:
             return
         noise, direction = (np.hstack(each) for each in ([n for n, *_ in tried], [s for _, s, _ in tried]))
         count = tried[0][0].shape[1]
-        direction, true = np.repeat(direction, count, axis=1), np.repeat([i for *_, i in tried], count)
-        alarm, named = np.full((2, len(SIZES), len(true)), _UNASKED)
-        rest, naming = np.arange(len(true)), Naming(self.comparison.explanations)
+        margins = _Margins(self, noise, np.repeat(direction, count, axis=1), np.repeat([i for *_, i in tried], count))
+        alarmed = named = np.ones(len(margins.true), dtype=bool)
         for row in reversed(range(len(SIZES))):
-            data = self.sigma * (noise[:, rest] + SIZES[row] * direction[:, rest])
-            statistic, odds = statistic_of(self.comparison, data)
-            alarm[row, rest] = statistic - self.threshold(data)
-            named[row, rest] = np.minimum(alarm[row, rest], naming(odds, true[rest]))
-            alarmed = alarm[row].reshape(-1, count) > 0
-            rest = np.flatnonzero(alarmed & (alarmed.sum(axis=1, keepdims=True) > np.ceil(quantile * (count - 1))))
-            if not len(rest):
+            alarmed, named = (
+                np.ravel(passed & (passed.sum(axis=1, keepdims=True) > np.ceil(quantile * (count - 1))))
+                for each in margins.passed(row, alarmed, named)
+                for passed in [each.reshape(-1, count)]
+            )
+            named = named & alarmed
+            if not np.any(alarmed):
                 break
-        yield from zip(*(np.split(_reached(each), len(tried)) for each in (alarm, named)), strict=True)
+        found = margins.alarm, np.minimum(margins.alarm, margins.name)
+        yield from zip(*(np.split(_reached(each), len(tried)) for each in found), strict=True)
+
+
+class _Margins:
+    """By how much recordings (b,) are alarmed and named, (sizes, b) each; exactly where one ends to be.
+
+    The log odds of something are no less than those of some explanations one by one, and a name has no more to pass than
+    some others: what does not decide is not looked at.
+    """
+
+    def __init__(self, rule: _Rule, noise: Floats, direction: Floats, true: Ints) -> None:
+        self.rule, self.noise, self.direction, self.true = rule, noise, direction, true
+        explanations, shape = rule.comparison.explanations, (len(SIZES), len(true))
+        self.alarm, self.name = np.full((2, *shape), _UNASKED)
+        self._bound, self._whole = np.zeros((2, *shape), dtype=bool)  # alarm is a bound; all explanations are known
+        # log evidence of nothing, and of explanations (sizes, c, b) as far as it is known
+        self._nothing, self._something = np.zeros(shape), np.full((len(SIZES), len(explanations), len(true)), -np.inf)
+        self._naming, self._prior = Naming(explanations), log_prior(explanations)
+
+    def passed(self, row: int, alarmed: NDArray[np.bool_], named: NDArray[np.bool_]) -> Iterator[NDArray[np.bool_]]:
+        """Which of those that are alarmed at the next larger size are at this one, and which of those that are named."""
+        largest, nothing, something = row + 1 == len(SIZES), self._nothing[row], self._something[row]
+        for i, rival in self._rivals:
+            for one in (i, rival) if largest else (i,):
+                self._weigh(row, alarmed & (self.true == i), {one})
+        if largest:
+            named = self._naming(something - nothing, self.true) > -_ROUNDING
+        self._weigh(row, named)
+        odds = something - nothing
+        self.name[row, named] = self._naming(odds[:, named], self.true[named])
+        shown = scipy.special.logsumexp(self._prior[:, None] + odds[:, alarmed], axis=0)
+        self.alarm[row, alarmed] = shown - self.rule.threshold(self._data(row, alarmed))
+        self._bound[row] = alarmed
+        self._settle(row, alarmed & (self.alarm[row] <= _ROUNDING))
+        now = alarmed & (self.alarm[row] > 0), named & (np.minimum(self.alarm, self.name)[row] > 0)
+        if not largest:
+            self._settle(row + 1, (alarmed & ~now[0]) | (named & ~now[1] & (self.alarm < self.name)[row + 1]))
+        yield from now
+
+    def _settle(self, row: int, which: NDArray[np.bool_]) -> None:
+        """The alarm's margins themselves, where they are bounds."""
+        which = which & self._bound[row]
+        if np.any(which):
+            self._weigh(row, which & ~self._whole[row])
+            data, single = self._data(row, which), (self._nothing[row, which], self._something[row][:, which])
+            found = statistic_of(self.rule.comparison, data, single)[0] - self.rule.threshold(data)
+            self.alarm[row, which], self._bound[row, which] = found, False
+
+    def _weigh(self, row: int, which: NDArray[np.bool_], among: set[int] | None = None) -> None:
+        if np.any(which):
+            self._nothing[row, which], found = self.rule.comparison.log_evidence(self._data(row, which), (), among)
+            self._something[row][:, which] = np.maximum(self._something[row][:, which], found)
+            self._whole[row] |= which & (among is None)
+
+    @cached_property
+    def _rivals(self) -> list[tuple[int, int]]:
+        """Effects that act, each with the effect that looks most like it."""
+        true, first = np.unique(self.true, return_index=True)
+        like = self.rule.comparison.log_evidence(self.rule.sigma * SIZES[-1] * self.direction[:, first])[1]
+        kinds = np.array([one.kind for one in self.rule.comparison.explanations])
+        like[kinds != EFFECT] = like[true, np.arange(len(true))] = -np.inf
+        return list(zip(true.tolist(), (like + self._prior[:, None]).argmax(axis=0).tolist(), strict=True))
+
+    def _data(self, row: int, which: NDArray[np.bool_]) -> Floats:
+        return np.asarray(self.rule.sigma * (self.noise[:, which] + SIZES[row] * self.direction[:, which]))
 
 
 # Visible lengths within which one is looked for; beyond the last nothing is said to be found

@@ -14,17 +14,8 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import shapes
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.planning.candidates import (
-    Information,
-    Selection,
-    by_measurement,
-    certified,
-    choose,
-    gram,
-    left_of,
-    scales,
-    shared,
-)
+from cmm_uq.analysis.planning.candidates import Information, by_measurement, certified, gram, left_of, scales, shared
+from cmm_uq.analysis.planning.exchange import Selection, choose
 from cmm_uq.analysis.planning.set_up import ODDS, DetectionChange, DetectionGoal, NextPlan, Separation, SetUp, append
 from cmm_uq.analysis.planning.setting import Planning, Volume, turned_set_ups
 from cmm_uq.base.errors import CmmUqError

@@ -12,7 +12,7 @@ from cmm_uq.analysis.conformity.plans import READY, Condition
 from cmm_uq.analysis.conformity.standards import standard_named
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import DrawnNoise, Power, powers, without_fault
-from cmm_uq.analysis.planning import candidates as choice, identifiability as design
+from cmm_uq.analysis.planning import candidates as choice, exchange, identifiability as design
 from cmm_uq.analysis.planning.candidates import candidates, ready_plan, thinned
 from cmm_uq.analysis.planning.set_up import SetUp, append, join, split
 from cmm_uq.analysis.planning.setting import Setting, Start, white_noise
@@ -293,10 +293,10 @@ def _searched(
     if not wanted:
         raise CmmUqError("no candidate placing shows any of these effects", where="job.toml [model] effects",
                          fix="Name effects that this artefact can show, or use another artefact")  # fmt: skip
-    score = choice.score_of(plan.criterion, known, wanted)
+    score = exchange.score_of(plan.criterion, known, wanted)
     count = plan.more or plan.number or (1 if keep else len(start.placings))
     count = _affordable(setting, count, possible, () if name == RECORDED else kept)
-    chosen = choice.choose(known, existing if keep else known.prior, score, count)
+    chosen = exchange.choose(known, existing if keep else known.prior, score, count)
     added = tuple(possible[i] for i in chosen.indices)
     return (*kept, *added), len(kept), (float(score(existing[None])[0]), chosen.after)
 

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import statistic_of
 from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
-from cmm_uq.analysis.diagnosis.power import POWER, DrawnNoise, Power, powers, without_fault
+from cmm_uq.analysis.diagnosis.power import POWER, SIZES, DrawnNoise, Naming, Power, _Rule, powers, without_fault
 from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.analysis.planning.setting import PlannedNoise
 from cmm_uq.artefacts import artefact_of
+from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, GAUGE, setting
@@ -56,6 +58,46 @@ def test_sizes_that_no_quantile_asks_for_change_no_amplitude() -> None:
             np.testing.assert_allclose(few[counts], every[counts], rtol=1e-9)
             assert np.all(few >= every * (1 - 1e-9))
     assert np.any(predicted()["rotation_y_y"].detected_at > predicted(0.0)["rotation_y_y"].detected_at * 1.01)
+
+
+@pytest.mark.long
+def test_sizes_are_those_of_all_odds_at_every_size() -> None:
+    """Against the rule applied whole to every recording in every size, each by itself."""
+    model = without_fault(SETTING.observed, SETTING.model(POINTS), Noise(SETTING.sigma), 0)
+    compared = model_comparison(model, SETTING.sigma, 0)
+    rule, naming = _Rule(compared.comparison, SETTING.sigma, ALPHA, None, compared.null), Naming(compared.explanations)
+    points = model.artefact.points.at(model.placed(compared.values))
+    for name in ("rotation_y_y", "rotation_x_y"):
+        effect, index = effects((name,))[0], rule.index(name)
+        assert index is not None
+        shown = rule.comparison.rest(
+            model.seen(effect.basis(points)[:, :, :1], compared.values) / rule.comparison.noise_scale[:, None]
+        )
+        shown /= np.linalg.norm(shown)
+        noise = rule.noise(shown, 0, 20)
+        margins = np.empty((2, len(SIZES), 20))
+        for i, size in enumerate(SIZES):
+            for j in range(20):
+                data = SETTING.sigma * (noise[:, [j]] + size * shown)
+                statistic, odds = statistic_of(rule.comparison, data)
+                margins[0, i, j] = (statistic - rule.threshold(data)).item()
+                margins[1, i, j] = min(margins[0, i, j], naming(odds, np.array([index])).item())
+        alarmed, named = (crossings(each) for each in margins)
+        found = predicted(0.0)[name]
+        np.testing.assert_allclose(found.detected_at, alarmed, rtol=1e-9)
+        np.testing.assert_allclose(found.named_at, named, rtol=1e-9)
+
+
+def crossings(margin: Floats) -> Floats:
+    """Size from which on each column stays positive, linear in the square of the size."""
+    found = np.full(margin.shape[1], SIZES[0])
+    for low in range(len(SIZES)):
+        for column in np.flatnonzero(margin[low] <= 0):
+            found[column] = np.inf
+            if low + 1 < len(SIZES):
+                part = np.interp(0.0, margin[low : low + 2, column], SIZES[low : low + 2] ** 2)
+                found[column] = np.sqrt(part)
+    return found
 
 
 @pytest.mark.long

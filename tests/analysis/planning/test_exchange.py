@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from itertools import combinations
 
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.candidates import Information, candidates, choose, score_of, set_up_information
+from cmm_uq.analysis.planning.candidates import Information, candidates, set_up_information
+from cmm_uq.analysis.planning.exchange import choose, score_of
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.inference.linear_model import Unknown
-from tests.analysis.planning.plans import BALLBAR, setting
+from tests.analysis.planning.plans import BALLBAR, GAUGE, setting
 
 PLACES = np.linspace(-1, 1, 21)
 
@@ -172,3 +176,31 @@ def test_more_placings_than_candidates_take_some_again() -> None:
     known = drawn(3)
     score = score_of("A", known, [0, 1, 2, 3])
     assert len(choose(known, known.prior, score, 31).indices) == 31
+
+
+@pytest.mark.parametrize("criterion", ["D", "A", "worst"])
+@pytest.mark.parametrize(("facts", "count"), [(BALLBAR, 4), (BALLBAR, 20), (GAUGE, 6)])
+def test_hopeless_candidates_are_not_missed(criterion: str, facts: ArtefactFacts, count: int) -> None:
+    """Against a search that looks at all of them every time: the same set-ups."""
+    chosen = setting(facts, candidates=90, **({} if facts is BALLBAR else {"length_mm": 820.0}))
+    possible = candidates(chosen)
+    known = set_up_information(chosen, possible, chosen.rivals(join(possible[:2])))
+    score = score_of(criterion, known, known.where(chosen.named))
+    found, every = (choose(known, known.prior, one, count) for one in (score, partial(score)))
+    assert found.indices == every.indices
+    assert found.after == every.after
+
+
+@pytest.mark.parametrize("criterion", ["D", "A", "worst"])
+@pytest.mark.parametrize("again", [False, True])
+def test_of_few_combinations_each_the_search_is_the_same(criterion: str, again: bool) -> None:
+    """Of candidates with one reading of twelve effects each, two of which are the same."""
+    for seed in range(6):
+        rows = np.random.default_rng(seed).standard_normal((60, 1, 12))
+        rows[7] = rows[31]
+        unknowns = tuple(Unknown((name, name), "", 0.0, 1.0, 1.0) for name in "abcdefghijkl")
+        known = Information(unknowns, rows.swapaxes(1, 2) @ rows, np.zeros((12, 12)))
+        score = score_of(criterion, known, [0, 1, 2, 5])
+        found, every = (choose(known, known.prior, one, 9, again=again) for one in (score, partial(score)))
+        assert found.indices == every.indices
+        assert found.after == every.after

@@ -190,9 +190,14 @@ def _nearer(comparison: CandidateComparison, draws: Floats, random: np.random.Ge
         found = np.append(found, robust_statistic_of(normal, more, least))
 
 
-def statistic_of(comparison: CandidateComparison, data: Floats) -> tuple[Floats, Floats]:
-    """Log odds (b,) of something for data (m', b): one explanation, or the best effect with any other; and (c, b) of each."""
-    found = _Evidence.of(comparison, data)
+def statistic_of(
+    comparison: CandidateComparison, data: Floats, single: tuple[Floats, Floats] | None = None
+) -> tuple[Floats, Floats]:
+    """Log odds (b,) of something for data (m', b): one explanation, or the best effect with any other; and (c, b) of each.
+
+    ``single``: log evidence of nothing, and of each explanation, where that is known.
+    """
+    found = _Evidence.of(comparison, data, single=single)
     return found.log_odds(), found.something - found.nothing
 
 
@@ -228,15 +233,18 @@ class _Evidence:
     both: Floats
 
     @classmethod
-    def of(cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None) -> _Evidence:
-        nothing, something = comparison.log_evidence(data)
-        single = known_singles(comparison)
+    def of(
+        cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None,
+        single: tuple[Floats, Floats] | None = None,
+    ) -> _Evidence:  # fmt: skip
+        nothing, something = single or comparison.log_evidence(data)
+        known = known_singles(comparison)
         alone, both = np.zeros_like(nothing), np.full_like(something, -np.inf)
-        if len(single) > 1:
-            lead = best_versions(comparison, data, single) if lead is None else lead
+        if len(known) > 1:
+            lead = best_versions(comparison, data, known) if lead is None else lead
             for version, columns in _together(lead).items():
-                alone[columns], both[:, columns] = comparison.log_evidence(data[:, columns], [version], single)
-        return cls(comparison.explanations, nothing, something, single, lead, alone, both)
+                alone[columns], both[:, columns] = comparison.log_evidence(data[:, columns], [version], known)
+        return cls(comparison.explanations, nothing, something, known, lead, alone, both)
 
     def share(self, part: float) -> None:
         """Make it that of noise that has a part of the probability."""
