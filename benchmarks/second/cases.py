@@ -43,6 +43,8 @@ STANDS_IN = 4.0
 """√λ that every known effect must leave of what is outside the catalogue: else it is a known effect, for all that is seen."""
 UNSEEN = 2.0
 """√λ that is left when a rival stands in an effect's place: below it nobody could tell."""
+RUNS = "axis_runs"
+"""Kind of a recording that has no artefact: light along lines."""
 U_SIZE = 0.2
 """Standard uncertainty of a certified length, µm."""
 DESIGNS: Mapping[str, Callable[[np.random.Generator], Placed]] = {
@@ -383,10 +385,12 @@ def job(one: Case, folder: Path, order: np.ndarray, decimals: int = 6) -> None:
     """One job folder, its rows in an order, its numbers with so many decimals."""
     folder.mkdir(parents=True, exist_ok=True)
     placed = one.placed
-    xyz = one.shown - placed.origin
+    runs = placed.kind == RUNS  # of which targets are written, and what is read less their way
+    xyz = (placed.true if runs else one.shown) - placed.origin
     numbers = {"measurement": placed.measurement, "point": placed.point, "repeat": placed.repeat}
     columns = {**numbers, **{f"{a}_mm": xyz[:, i] for i, a in enumerate("xyz")}, **placed.recorded}
-    if placed.residuals is not None:
+    columns |= {"reading_um": -1e3 * one.y} if runs else {}
+    if placed.repeat.max() == 1:
         del columns["repeat"]
     _table(folder / "recording.csv", columns, order, lambda v: f"{v:.{decimals}f}".rstrip("0").rstrip("."), ",")
     simulation = ""
@@ -399,6 +403,7 @@ def job(one: Case, folder: Path, order: np.ndarray, decimals: int = 6) -> None:
         simulation = ('[simulation]\nfile = "predicted.csv"\nprogram = "a script"\n'
                       'columns = { x_mm = "X [mm]", y_mm = "Y [mm]", z_mm = "Z [mm]" }\n')  # fmt: skip
     certified = f"length_mm = {placed.length!r}\nu_um = {U_SIZE}\n" if one.certified else ""
+    certified += "u_scale_um_per_m = 0.05\n" if runs else ""
     stated = f"u_coordinate_um = {1e3 * one.stated:.4f}\n" if one.stated else ""
     (folder / "job.toml").write_text(
         f'[job]\nid = "concealed"\ndate = 2026-01-01\norigin = "simulated"\n[machine]\nname = "simulated"\nchain = "XYZ"\n'

@@ -12,7 +12,7 @@ from benchmarks.concealed.generator import sizes_for
 from benchmarks.concealed.physics import KNOWN, LARGEST, Error, kind_of
 from benchmarks.second import artefacts, maps, noises
 from benchmarks.second.artefacts import SIX, Placed
-from benchmarks.second.cases import COLUMNS, UNSEEN, Case, Seen, indicated, of_effects, visible
+from benchmarks.second.cases import COLUMNS, RUNS, UNSEEN, Case, Seen, indicated, of_effects, visible
 from benchmarks.third.forms import DICTIONARY, OTHERS, Outside, drawn
 
 CYCLE = (
@@ -96,33 +96,53 @@ def _attempt(random: np.random.Generator, number: int) -> Hidden | None:
     hidden = _hidden(random, kind, seen)
     if hidden is None:
         return None
-    errors, sizes, outside = hidden
+    return composed(random, number, kind, what, seen, noise, full, hidden, simulated=simulated, shape=shape)
 
+
+def composed(
+    random: np.random.Generator, number: int, kind: str, what: str, seen: Seen, noise: noises.Noise, full: dict,
+    hidden: tuple[Mapping[str, Error], Mapping[str, float], Outside | None], *, simulated: bool, shape: Mapping[str, float],
+    effects: Mapping[str, Error] = KNOWN, readings: Callable[..., np.ndarray] = noises.readings,
+) -> Hidden:  # fmt: skip
+    """A case of a recording in which something is hidden.
+
+    Parameters
+    ----------
+    full : columns of the recording, with those that are not written.
+    hidden : errors and their sizes, and what no catalogue has of them.
+    simulated : whether the model is a prediction.
+    shape : of what effects have besides a size.
+    effects : by name, of the job and of a prediction.
+    readings : their noise, (n, 3) mm.
+    """
+    errors, sizes, outside = hidden
+    placed, named = seen.design, seen.named
     base = {name: float(random.normal(0, LARGEST[kind_of(name)] / 6)) for name in (SIX if simulated else named)}
     machine = int(random.choice([0, *maps.SQUARENESS])) if simulated else 0
-    known = of_effects({name: KNOWN[name] for name in base}, base, seen.context)
+    known = of_effects({name: effects[name] for name in base}, base, seen.context)
     simulation = (lambda p: maps.error(p, machine)) if machine else known
     more = of_effects(errors, sizes, seen.context)
-    p = indicated(placed.true, lambda q: simulation(q) + more(q))
-    whole = Placed(**{**placed.__dict__, "recorded": full})
-    shown = noises.displayed(noise, p + noises.readings(random, noise, whole))
+    runs = placed.kind == RUNS  # the carriages stand at their targets, and what is read is rounded
+    p = placed.true - known(placed.true) - more(placed.true) if runs else indicated(
+        placed.true, lambda q: simulation(q) + more(q))  # fmt: skip
+    shown = p + readings(random, noise, Placed(**{**placed.__dict__, "recorded": full}))
+    shown = shown if runs else noises.displayed(noise, shown)
     predicted = indicated(placed.true, simulation) if simulated else None
     told = random.random()
-    stated = (
-        None if told < 0.5 or kind == "real" else 1e3 * noise.sigma * (1.0 if told < 0.9 else random.choice([0.5, 2.0]))
-    )
+    stated = None if told < 0.5 or placed.residuals is not None else (
+        1e3 * noise.sigma * (1.0 if told < 0.9 else random.choice([0.5, 2.0])))  # fmt: skip
     order = random.permutation(len(p)) if random.random() < 0.3 else np.arange(len(p))
+    y = placed.D @ (shown - (placed.true if predicted is None else predicted)).ravel()
     truth = {
-        "kind": kind, "design": what, "noise": asdict(noise), "named": named, "certified": certified, "stated_um": stated,
-        "machine": machine, "simulated": simulated, "hidden": sizes, "outside": outside and asdict(outside),
-        "recorded": sorted(placed.recorded), "observations": len(covariance), **shape,
+        "kind": kind, "design": what, "noise": asdict(noise), "named": named, "certified": seen.certified,
+        "stated_um": stated, "machine": machine, "simulated": simulated, "hidden": dict(sizes),
+        "outside": outside and asdict(outside), "recorded": sorted(placed.recorded), "observations": len(y), **shape,
     }  # fmt: skip
-    away = shown - (placed.true if predicted is None else predicted)
     one = Case(
-        f"{number:04d}", placed, noise, named, certified, stated and 1e-3 * stated, seen.context, shown,
-        placed.D @ away.ravel(), truth, predicted, order,
+        f"{number:04d}", placed, noise, named, seen.certified, stated and 1e-3 * stated, seen.context, shown,
+        noises.displayed(noise, y) if runs else y, truth, predicted, order,
     )  # fmt: skip
-    found = Hidden(one, seen, errors, sizes, outside)
+    found = Hidden(one, seen, dict(errors), dict(sizes), outside)
     alone_seen = {name: float(np.linalg.norm(sizes[name] * seen.seen(error))) for name, error in errors.items()}
     truth |= {"root_lambda": float(np.linalg.norm(found.signal)), "root_lambda_of": alone_seen}
     return found
@@ -136,7 +156,7 @@ def _hidden(
     if kind in OUTSIDE or (kind == "real" and random.random() < 0.5):
         return _outside(random, OTHERS if kind == "other" else DICTIONARY, seen)
     if kind == "ratio":
-        return _in_ratio(random, seen)
+        return _ratio(random, seen)
     among = {name: error for name, error in visible(seen.design).items() if name not in seen.named}
     count = 3 if kind == "squareness" else int(random.choice([1, 1, 2])) if kind == "catalogue" else 1
     if len(among) < count:
@@ -152,10 +172,15 @@ def _hidden(
 
 def _outside(random: np.random.Generator, forms: Mapping, seen: Seen) -> tuple[dict, dict, Outside] | None:
     outside = drawn(random, forms, seen.design.true, seen.context)
-    if outside is None:
-        return None
+    return outside and sized(random, outside, seen, 3.5, 25.0)
+
+
+def sized(
+    random: np.random.Generator, outside: Outside, seen: Seen, low: float, high: float
+) -> tuple[dict, dict, Outside] | None:
+    """As large as a √λ between two says; nothing where that is absurd, or for all that is seen a known effect."""
     error = outside.error()
-    signal, wanted = seen.seen(error), float(np.exp(random.uniform(np.log(3.5), np.log(25.0))))
+    signal, wanted = seen.seen(error), float(np.exp(random.uniform(np.log(low), np.log(high))))
     sizes = sizes_for(random, seen, {outside.name: error}, {outside.name: wanted}, {outside.name: signal})
     if sizes is None or (seen.design.residuals is not None and abs(sizes[outside.name]) > 150):
         return None
@@ -166,10 +191,15 @@ def _outside(random: np.random.Generator, forms: Mapping, seen: Seen) -> tuple[d
     return ({outside.name: error}, sizes, outside) if left > max(UNSEEN, 0.5 * wanted) else None
 
 
-def _in_ratio(random: np.random.Generator, seen: Seen) -> tuple[dict, dict, None] | None:
+def _ratio(random: np.random.Generator, seen: Seen) -> tuple[dict, dict, None] | None:
     """Two scales or two squarenesses as 1 : 2, and nothing else."""
-    first, second = (str(name) for name in random.permutation(SIX[:3] if random.random() < 0.5 else SIX[3:])[:2])
-    errors = {first: KNOWN[first], second: KNOWN[second]}
+    names = random.permutation(SIX[:3] if random.random() < 0.5 else SIX[3:])[:2]
+    return in_ratio(random, {str(name): KNOWN[str(name)] for name in names}, seen)
+
+
+def in_ratio(random: np.random.Generator, errors: dict[str, Error], seen: Seen) -> tuple[dict, dict, None] | None:
+    """Two errors as 1 : 2."""
+    first, second = errors
     unit = float(np.linalg.norm(seen.seen(errors[first]) + 2 * seen.seen(errors[second])))
     if unit < 1e-9:
         return None

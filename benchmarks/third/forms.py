@@ -53,7 +53,8 @@ def _nothing_drawn(random: np.random.Generator) -> dict[str, float]:
 
 _PLACES, _WIDTHS = np.linspace(0.08, 0.92, 43), np.geomspace(0.03, 0.2, 9)
 DICTIONARY: dict[str, Form] = {
-    "step": Form(lambda u, at: (u > at).astype(float), lambda r: {"at": r.uniform(0.25, 0.75)}, _members(at=_PLACES)),
+    "step": Form(lambda u, at: (u > at).astype(float), lambda r: {"at": r.uniform(0.25, 0.75)},
+                 _members(at=np.linspace(0.08, 0.92, 169))),
     "dent": Form(lambda u, at, width: np.exp(-0.5 * ((u - at) / width) ** 2),
                  lambda r: {"at": r.uniform(0.2, 0.8), "width": r.uniform(0.04, 0.12)},
                  _members(at=_PLACES, width=_WIDTHS)),
@@ -64,7 +65,7 @@ DICTIONARY: dict[str, Form] = {
                        _members(at=np.linspace(-0.1, 0.9, 26), width=np.geomspace(0.05, 0.4, 9))),
     "sawtooth": Form(lambda u, period, start: (u / period + start) % 1.0,
                      lambda r: {"period": r.uniform(0.2, 0.5), "start": r.uniform(0, 1)},
-                     _members(period=np.geomspace(0.15, 0.6, 40), start=np.arange(12) / 12)),
+                     _members(period=np.geomspace(0.15, 0.6, 60), start=np.arange(24) / 24)),
     "exponential": Form(lambda u, time: np.exp(-u / time), lambda r: {"time": r.uniform(0.08, 0.35)},
                         _members(time=np.geomspace(0.04, 0.8, 20))),
     "sine": Form(_sine,
@@ -155,7 +156,7 @@ class Outside:
         chosen = self.parameters if parameters is None else parameters
 
         def e(p: np.ndarray, c: dict) -> np.ndarray:
-            return self.acting(value(*self.covariates(p, c), **chosen), p)
+            return component(self.along, self.acting(value(*self.covariates(p, c), **chosen)[:, None], p)[:, 0])
 
         return e
 
@@ -165,8 +166,8 @@ class Outside:
         return [(value - low) / (high - low) for value, (low, high) in zip(values, self.spans, strict=True)]
 
     def acting(self, values: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Errors (n, 3), mm, of a function (n,), µm or µm/m."""
-        return component(self.along, 1e-3 * values * (1e-3 * p[:, self.along] if self.scale else 1.0))
+        """How far functions (n, k), µm or µm/m, move the points along the axis, mm."""
+        return np.asarray(1e-3 * values * (1e-3 * p[:, [self.along]] if self.scale else 1.0))
 
     def only(self, index: int) -> Outside:
         """The same of one of its covariates."""

@@ -8,18 +8,20 @@ anything is. Nothing here comes from the package.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 from scipy import special, stats
 
-from benchmarks.second.cases import baseline
-from benchmarks.second.oracle import searched
+from benchmarks.second.cases import Case, baseline
+from benchmarks.second.oracle import Forms, forms, searched_among
 from benchmarks.third.cases import Hidden
 from benchmarks.third.forms import DICTIONARY, POSITIONS, TWO, Outside
-from benchmarks.third.known import rivals
+from benchmarks.third.known import further, rivals
 
 VISIBLE = (2.0, 5.0, 12.0, 30.0)
 """Standard deviations of √λ that an explanation may have, each as probable as any other."""
@@ -32,12 +34,24 @@ LEAST = 1e-6
 """Length of a column, over its length before the model took its part, below which nothing of it is seen."""
 
 
-def searched_for(found: Hidden, seed: int) -> dict[str, Any]:
-    """What oracles say of a case: of effects of the catalogue that of the second study, which estimates the noise."""
+def searched_for(found: Hidden, seed: int, *, whole: bool = False) -> dict[str, Any]:
+    """What oracles say of a case: of effects of the catalogue that of the second study, which estimates the noise, and looks
+    for those of the second study or for the ``whole`` catalogue."""
     if found.outside is not None:
         return told(found, seed)
-    search = searched(found.one, knows_noise=False, seed=seed)
+    search = searched_among(found.one, *catalogue(found.one, whole), knows_noise=False, seed=seed)
     return {"effects": list(search.effects), "p": search.p_value, "rivals": rivals(found)}
+
+
+def catalogue(one: Case, whole: bool) -> tuple[list[str], list[Forms]]:
+    """Effects and what each looks like in a recording: of those that have a place or a time in them every third."""
+    names, known = forms(one)
+    if not whole:
+        return names, known
+    more = {name: errors[:: 3 if len(errors) > 20 else 1] for name, errors in further(one.placed.recorded).items()}
+    owner = np.repeat(len(names) + np.arange(len(more)), [len(errors) for errors in more.values()])
+    e = [error(one.placed.true, one.context).ravel() for errors in more.values() for error in errors]
+    return [*names, *more], [*known, Forms((-one.placed.D @ np.column_stack(e))[:, :, None], owner)]
 
 
 def told(found: Hidden, seed: int) -> dict[str, Any]:
@@ -95,11 +109,20 @@ def families(found: Hidden, outside: Outside) -> Iterator[tuple[str, np.ndarray]
             yield form, np.concatenate(columns, axis=1)
 
 
+@lru_cache(maxsize=32)
+def _values(found: Hidden, of: tuple[str, ...], spans: tuple[tuple[float, float], ...], form: str) -> np.ndarray:
+    """(n, members) of a form of some covariates, whatever axis it acts along."""
+    each = Outside("", of, spans, 0, False, {}).covariates(found.one.placed.true, found.one.context)
+    members = [parameters for member in DICTIONARY[form].members() for parameters in member]
+    return np.column_stack([DICTIONARY[form].value(*each, **parameters) for parameters in members])
+
+
 def _columns(found: Hidden, outside: Outside, form: str, members: list[list[dict[str, float]]]) -> np.ndarray:
-    placed, context = found.one.placed, found.one.context
-    e = [outside.error(form, parameters)(placed.true, context).ravel() for member in members for parameters in member]
-    whole = -found.seen.rest @ (placed.D @ np.column_stack(e))
-    plain = np.linalg.norm(placed.D @ np.column_stack(e), axis=0) / found.one.noise.sigma
+    placed = found.one.placed
+    D = placed.D.reshape(len(placed.D), -1, 3)[:, :, outside.along]  # all of it acts along one axis
+    moved = D @ outside.acting(_values(found, outside.of, outside.spans, form), placed.true)
+    whole = -found.seen.rest @ moved
+    plain = np.linalg.norm(moved, axis=0) / found.one.noise.sigma
     whole = np.where(np.linalg.norm(whole, axis=0) > LEAST * np.maximum(plain, 1e-300), whole, 0.0)
     return whole.reshape(len(whole), len(members), -1)
 
@@ -126,8 +149,8 @@ def _waves(u: list[np.ndarray], most: int) -> list[tuple[np.ndarray, float]]:
 
 def _acting(found: Hidden, outside: Outside, values: list[np.ndarray]) -> np.ndarray:
     placed = found.one.placed
-    e = np.column_stack([outside.acting(value, placed.true).ravel() for value in values])
-    return np.asarray(-found.seen.rest @ (placed.D @ e))
+    D = placed.D.reshape(len(placed.D), -1, 3)[:, :, outside.along]
+    return np.asarray(-found.seen.rest @ (D @ outside.acting(np.column_stack(values), placed.true)))
 
 
 def log_evidence(columns: np.ndarray, y: np.ndarray) -> float:
@@ -179,18 +202,20 @@ def unformed(
 
 def _surprise(found: Hidden, outside: Outside, all_y: np.ndarray) -> np.ndarray:
     """(draws,) of the most surprising form of some covariates, or sum of cosines: the logarithm of its p-value, negative."""
-    every = [_basis(columns[:, i]) for _, columns in families(found, outside) for i in range(columns.shape[1])]
     u = outside.covariates(found.one.placed.true, found.one.context)
     plain = _acting(found, outside, [wave for wave, _ in _waves(u, PLAIN if len(u) == 1 else 4)])
-    every += [_basis(plain[:, :k]) for k in range(2, plain.shape[1] + 1, 2)]
-    ones = [basis for basis in every if basis.shape[1] == 1]
-    best = np.zeros(all_y.shape[1])
-    if ones:
-        best = -stats.chi2.logsf(np.max(np.square(np.hstack(ones).T @ all_y), axis=0), 1)
-    for basis in every:
-        if basis.shape[1] > 1:
-            best = np.maximum(best, -stats.chi2.logsf(np.sum(np.square(basis.T @ all_y), axis=0), basis.shape[1]))
-    return best
+    several = [_basis(plain[:, :k]) for k in range(2, plain.shape[1] + 1, 2)]
+    most: dict[int, np.ndarray] = defaultdict(lambda: np.zeros(all_y.shape[1]))  # by how many columns
+    for _, columns in families(found, outside):
+        if columns.shape[2] > 1:
+            several += [_basis(columns[:, i]) for i in range(columns.shape[1])]
+            continue
+        ones, size = columns[:, :, 0], np.linalg.norm(columns[:, :, 0], axis=0)
+        most[1] = np.maximum(most[1], np.max(np.square((ones / np.where(size > 0, size, 1.0)).T @ all_y), axis=0))
+    for basis in several:
+        count = basis.shape[1]
+        most[count] = np.maximum(most[count], np.sum(np.square(basis.T @ all_y), axis=0))
+    return np.max([-stats.chi2.logsf(squares, count) for count, squares in most.items() if count], axis=0, initial=0.0)
 
 
 def _basis(columns: np.ndarray) -> np.ndarray:

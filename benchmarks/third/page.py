@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.marked import put
-from benchmarks.second import judging as second
+from benchmarks.second import judging as second, noises
 from benchmarks.second.judging import proportion
-from benchmarks.third.cases import EFFECTS, KINDS, NOISES, OUTSIDE
+from benchmarks.third.cases import EFFECTS, KINDS, OUTSIDE, case
 from benchmarks.third.judging import Judged, Name, calibration
+from benchmarks.third.running import Generator
 
 BEGIN, END = "<!-- written by benchmarks.third.study -->", "<!-- end of the third -->"
 FEW = 20
@@ -66,6 +67,8 @@ nothing, under equal priors |
 2), nor a form against which the oracle has less than 20 : 1. Of *squareness* and *ratio* an effect is right only \
 where the truth is named with it; against a prediction also a scale or squareness worth 20 : 1 of what is hidden |"""
 
+THIRD = Generator(case, 200, whole=False, marks=(BEGIN, END), said=SAID)
+
 
 @dataclass(frozen=True)
 class Row:
@@ -79,18 +82,19 @@ class Row:
 
 def write(
     every: Sequence[Judged], before: Sequence[Judged], state: str, asked: dict[str, Any], docs: Path | None,
-    further: Sequence[str] = (),
+    further: Sequence[str] = (), said: str = SAID, marks: tuple[str, str] = (BEGIN, END),
 ) -> None:  # fmt: skip
-    """Print the page, with ``further`` tables, and write it into ``docs`` where that is given."""
+    """Print the page, with ``further`` tables and what is ``said`` of how it was done, and write it between ``marks`` into
+    ``docs`` where that is given."""
     page = [state, ""]
     for part in (_rows(every, before), _missed(every), _outside(every), _others(every), _verdicts(every), _nothing(every),
                  _inside(every), _said(every), further):  # fmt: skip
         page += [*part, ""] if part else []
-    page.append(SAID.format(**asked))
+    page.append(said.format(**asked))
     text = "\n".join(page) + "\n"
     print(text)
     if docs is not None:
-        put(docs / "diagnosis-studies.md", BEGIN, END, text.strip())
+        put(docs / "diagnosis-studies.md", *marks, text.strip())
 
 
 def share(hits: Iterable[Any]) -> str:
@@ -123,8 +127,10 @@ def figures(every: Sequence[Judged]) -> list[Row]:
     # a form that no dictionary has is named as another, or not at all: that is counted apart
     known = [name for one in every for name in one.names if not (one.kind == "other" and name.form)]
     nothing = [one for one in every if one.kind == "nothing"]
-    by_noise = {kind: [one.alarm for one in nothing if one.noise == kind] for kind in NOISES}
-    worst = max((kind for kind in NOISES if by_noise[kind]), key=lambda k: float(np.mean(by_noise[k])), default="")
+    by_noise = {kind: [one.alarm for one in nothing if one.noise == kind] for kind in noises.KINDS}
+    worst = max(
+        (kind for kind in noises.KINDS if by_noise[kind]), key=lambda k: float(np.mean(by_noise[k])), default=""
+    )
     powers = [one.found for one in every if one.kind == "catalogue" and one.found]
     mine, theirs = sum(a for a, _ in powers), sum(b for _, b in powers)
     parted = [(members, apart) for one in every for members, apart in one.classes]
@@ -259,7 +265,7 @@ def _verdicts(every: Sequence[Judged]) -> list[str]:
 def _nothing(every: Sequence[Judged]) -> list[str]:
     nothing = [one for one in every if one.kind == "nothing"]
     lines = ["### Without a cause", "", "| noise | false alarms | undetermined | a name |", "| --- | --- | --- | --- |"]
-    for kind in (*NOISES, None):
+    for kind in (*(kind for kind in noises.KINDS if any(one.noise == kind for one in nothing)), None):
         own = [one for one in nothing if kind in (one.noise, None)]
         lines.append(f"| {kind or '**all**'} | {share(o.alarm for o in own)} | "
                      f"{sum(o.verdict == 'undetermined' for o in own)} | {sum(bool(o.names) for o in own)} |")  # fmt: skip
