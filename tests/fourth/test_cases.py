@@ -114,7 +114,7 @@ def test_readings_scatter_as_the_oracle_is_told(kind: str) -> None:
 
 
 @pytest.mark.parametrize("form", forms.DICTIONARY)
-def test_a_form_of_the_dictionary_is_one_of_the_oracle_s(form: str) -> None:
+def test_a_form_of_the_dictionary_is_one_that_an_oracle_tries(form: str) -> None:
     """A grid's member is near it at sixty places; a sine is a sum of its columns."""
     random = np.random.default_rng(1)
     curve, ranges, able = forms.DICTIONARY[form]
@@ -154,7 +154,8 @@ def test_kinds_come_as_often_as_asked_and_families_round() -> None:
                              if name.startswith(FAMILIES)} - {"rotary_location"}  # fmt: skip
 
 
-def test_the_whole_catalogue_finds_what_the_second_study_s_has_not() -> None:
+@pytest.mark.long
+def test_the_whole_catalogue_finds_what_the_second_study_has_not() -> None:
     found = next(f for i in range(400) if (f := case(999, i)).one.truth["kind"] == "catalogue"
                  and set(f.sizes) & set(further(f.one.placed.recorded)) and len(f.sizes) == 1
                  and f.one.truth["root_lambda"] > 9)  # fmt: skip
@@ -165,6 +166,7 @@ def test_the_whole_catalogue_finds_what_the_second_study_s_has_not() -> None:
     assert {*found.sizes, *said["rivals"][next(iter(found.sizes))]} & set(said["effects"])
 
 
+@pytest.mark.long
 def test_jobs_are_apart_from_their_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, truth = tmp_path / "jobs here", tmp_path / "apart"
     said = {
