@@ -35,8 +35,10 @@ from cmm_uq.maths.uncertainty.quantity import nominal
 
 def conditions(job: Job) -> Facts:
     """As stated, and the least and largest recorded temperatures; without rows where there are none."""
-    columns = job.points.columns
+    columns, constant = job.points.columns, job.facts.recording.constant
     recorded = commas(
+        say("{what} {value} {unit}, stated for the whole recording", what=what, value=signed(constant[name], ".2f"),
+            unit=unit("°C")) if name in constant else
         say("{what} {low} to {high} {unit}", what=what, low=signed(float(columns[name].min()), ".2f"),
             high=signed(float(columns[name].max()), ".2f"), unit=unit("°C"))
         for name, what in TEMPERATURES.items() if name in columns

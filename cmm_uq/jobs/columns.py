@@ -72,6 +72,7 @@ _OF_SOME_MACHINES = re.compile(
 )
 # columns that a recording may have, and that are refused in another unit than that of their name
 OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SOME_MACHINES.fullmatch(name))
+AMBIENT = tuple(name for name in OPTIONAL if re.fullmatch(r"temp_\w+_c|pressure_hpa|humidity_pct", name))
 # what instruments read, which the kinds that go by it describe
 READINGS = (
     *(

@@ -104,7 +104,7 @@ def _changed(
     _state(document["artefact"], certified)
     if file is not None:  # the recording in the project's own format, without the keys by which it was imported
         document["recording"]["file"] = file
-        _drop(document["recording"], ImportKeys.model_fields)
+        _drop(document["recording"], (*ImportKeys.model_fields, "constant"))
     return document
 
 

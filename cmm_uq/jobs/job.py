@@ -9,16 +9,18 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field_validator, model_validator
 
-from cmm_uq.base.errors import suggestion
-from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED, STATED
-from cmm_uq.base.files.table import JobTable, Limit, Names, Number, at_least, key, required
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.limits import COLUMNS, CONFORMITY, EFFECTS, LISTED, STATED
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Limit, Names, Number, at_least, key, required
 from cmm_uq.base.messages import Text, html_table, say
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
 from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.acquired import Provenance
+from cmm_uq.jobs.columns import AMBIENT
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition
 from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.recording.compared import Prediction, SimulationFacts
@@ -94,6 +96,9 @@ class Recorded(JobTable):
     earlier: str | None = None
     """Recording of the same artefact in the same placings at an earlier date: what changed between is estimated."""
     earlier_date: dt.date | None = key(None, "Date of the earlier recording.")
+    constant: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
+    """Columns that the file has not, each at one value for the whole recording, as the head of an export says a temperature:
+    `{ temp_air_c = 20.4 }`."""
     u_coordinate_um: Limit | None = None
     """Stated standard uncertainty of one recorded coordinate; left out, it is estimated from repeats and residuals."""
     set_aside: Annotated[list[Aside], Field(max_length=LISTED.most)] = []
@@ -103,6 +108,18 @@ class Recorded(JobTable):
     @property
     def measurements_aside(self) -> tuple[int, ...]:
         return tuple(entry.measurement for entry in self.set_aside)
+
+    def with_constant(self, points: Points, toml: Path) -> Points:
+        """The points of the recording with what is stated of all of them."""
+        where = f"{toml}: [recording] constant"
+        for name in self.constant:
+            if name in points.columns:
+                raise CmmUqError(f"the recording has {name} itself", where=where, fix="Leave it out")
+            if name not in AMBIENT:
+                problem = f"{name} is no temperature, pressure or humidity"
+                raise CmmUqError(problem, where=where, fix=suggestion(name, AMBIENT))
+        given = {name: np.full(len(points), value) for name, value in self.constant.items()}
+        return replace(points, columns={**points.columns, **given}) if given else points
 
 
 class RecordingFacts(ImportKeys, Recorded):

@@ -157,6 +157,7 @@ def _read_alone(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     points, recognised = read_recording_file(
         inputs[facts.recording.file], where, machine, facts.recording, acquired.without if acquired else ()
     )
+    points = facts.recording.with_constant(points, path)
     points = replace(
         in_coordinates(points, facts.machine, where), in_seconds=acquired is not None and not acquired.changed
     )

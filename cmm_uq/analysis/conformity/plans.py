@@ -48,6 +48,12 @@ def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float
     return _crossed(*_line(machine, middle, direction))
 
 
+def crossed_shares(machine: Machine, middle: Floats, direction: Floats) -> Floats:
+    """Part of the travel of each axis (3,) that a line through ``middle`` (3,) crosses, where travel is stated."""
+    u = np.abs(direction / np.linalg.norm(direction))
+    return np.asarray((crossed_travel(machine, middle, direction) or 0.0) * u / np.ptp(machine.travel_mm, axis=1))
+
+
 Numbers = tuple[float, ...]
 
 

@@ -24,9 +24,10 @@ from cmm_uq.analysis.conformity.standard import (
 )
 from cmm_uq.analysis.conformity.statement import CHOSEN, ITS_RULE, REPORTED, Clause, Remeasurement, Statement
 from cmm_uq.analysis.conformity.uncertainty import FORM_LINES, LENGTH_LINES, REPEAT_LINES, SIZE_LINES, normal_expansion
-from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import STANDARDS, Plugin, named, offered
+from cmm_uq.jobs.tables.adoptions import adopted, nearest, taken_for
 from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
@@ -340,7 +341,7 @@ def decidable(
     """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement."""
     standard, where = standard_named(facts.standard), f"job.toml {key} standard"
     if standard is None:
-        fix = suggestion(facts.standard, names())
+        fix = nearest(facts.standard, names())
         raise CmmUqError(f"no standard {facts.standard!r} is decided", where=where, fix=fix)
     characteristic = characteristic_of(standard, facts, key)
     if characteristic.observed not in tested:
@@ -358,11 +359,16 @@ def decidable(
 
 
 def standard_named(name: str) -> Standard | None:
-    """A standard by its name; ``None`` where there is none. A built-in one cannot be replaced."""
+    """A standard by its name or that of an adoption; ``None`` where there is none. A built-in one cannot be replaced."""
     if name in BUILT_IN:
         return BUILT_IN[name]
-    outside = named(offered(STANDARDS, Plugin), name)
-    return None if outside is None else outside.loaded(Standard)
+    if (outside := named(offered(STANDARDS, Plugin), name)) is not None:
+        return outside.loaded(Standard)
+    adoption = adopted(name, BUILT_IN)
+    if adoption is None or adoption.name not in BUILT_IN:
+        return None
+    own = BUILT_IN[adoption.name]
+    return replace(own, remarks=(*own.remarks, *taken_for(name, adoption)))
 
 
 def names() -> tuple[str, ...]:

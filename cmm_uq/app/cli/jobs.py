@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json as json_text
 import re
-from collections.abc import Iterable, Iterator, Mapping
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,7 @@ from cmm_uq.base.files.limits import value_of
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck
     from cmm_uq.certificate.wording import Summary
+    from cmm_uq.jobs.importing.cells.stated import Offer
     from cmm_uq.jobs.importing.format import ImportKeys, Recognition
     from cmm_uq.jobs.job import Job
 
@@ -157,6 +159,7 @@ def import_export(
         amounts,
         example,
         lines_asked,
+        offered,
         placed_by_plan,
         read_export,
         remember,
@@ -178,13 +181,16 @@ def import_export(
             remember(save_as, keys, asked[0].head)
         if asked is not None and not silent:
             show_proposed(*asked)
+            show_offered(offered(file, keys))
         raise
     if save_as:
         remember(save_as, keys, export.recognised.head)
     if json:
-        put(json_text.dumps(export.recognised.data, indent=2, ensure_ascii=False) + "\n")
+        stated = {one.key: {"value": one.value, "words": one.words, "line": one.line} for one in offered(file, keys)}
+        put(json_text.dumps({**export.recognised.data, "stated": stated}, indent=2, ensure_ascii=False) + "\n")
     elif not quiet:
         show_recognised(export.recognised)
+        show_offered(offered(file, keys))
         say(f"Read: {amounts(export)}; the first {example(export)}")
         say("Another column: --column x_mm=3. The answers for the next export of this kind: --save-as NAME")
     if out is not None:
@@ -260,15 +266,27 @@ def show_recognised(recognised: Recognition) -> None:
     show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
 
 
-def show_proposed(recognised: Recognition | None, example: str, places: Mapping[str, tuple[str, str]]) -> None:
+def show_offered(offers: Sequence[Offer]) -> None:
+    """What the file says of its measurement, and the options of ``cmm-uq new`` that take it over."""
+    if offers:
+        table = screen_layout(verbose=True).table([one.row for one in offers])
+        show([(("Said of the measurement", "bold"),), *table, ()])
+    taken = " ".join(f"--set {shlex.quote(one.setting)}" for one in offers if one.taken)
+    if taken:
+        say(f"To take it over, where it is right, with cmm-uq new --from: {taken}")
+
+
+def show_proposed(recognised: Recognition | None, example: str, places: Mapping[str, tuple[str, str, str]]) -> None:
     """How lengths were read, and the question where their lines lie, as options of the command."""
     if recognised is not None:
         show_recognised(recognised)
-    asked = {name: own[0] or own[1] for name, own in places.items() if not own[0] or "?" in own[0]}
-    lines = (f'--line "{name}={place}"' for name, place in asked.items())
+    asked = {name: own for name, own in places.items() if not own[0] or "?" in own[0]}
     say(f"Read as: {example}")
     planned = ", or --plan plan.csv where they were planned" if recognised is not None else ""
-    say(f"Where they lie: {' '.join(lines)}{planned}")
+    say(f"Where they lie, with figures in mm for each ?{planned}:")
+    for name, (place, like, words) in asked.items():
+        beside = f"   # the file says: {words}" if words else ""
+        say(f'  --line "{name}={place or re.sub("[0-9]+", "?", like)}"{beside}')
 
 
 def show_imported(job: Job, *, silent: bool) -> None:

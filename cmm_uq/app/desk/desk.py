@@ -198,7 +198,7 @@ class Desk(DeskFolder):
         return self._fields(one, kind)
 
     def _fields(self, one: Draft, kind: str, refused: CmmUqError | None = None) -> WebPage:
-        fields = self.reader.ask("fields", kind=kind)
+        fields = self.reader.ask("fields", kind=kind, export=one.export, keys=one.keys)
         values = {each["key"]: one.values.get(each["key"], "") for each in fields}
         found = None
         if refused is not None:

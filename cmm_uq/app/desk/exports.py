@@ -11,13 +11,22 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.app.commands.jobs.exchange import amounts, lines_asked, placed_by_plan, proposed, remember, remembered_keys
+from cmm_uq.app.commands.jobs.exchange import (
+    amounts,
+    lines_asked,
+    offered,
+    placed_by_plan,
+    proposed,
+    remember,
+    remembered_keys,
+)
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.importing.answers import matching, path_of
 from cmm_uq.jobs.importing.format import Cell, ImportKeys, Recognition, Sheet, letters, sources_of
 from cmm_uq.jobs.importing.header import NAME, Header, text_of, understood
+from cmm_uq.jobs.importing.lines import SAME_PLACE
 from cmm_uq.jobs.importing.recording import example, imported, points_of, tables_in
 from cmm_uq.jobs.importing.roles import said as role_said
 
@@ -66,13 +75,15 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
         "example": "",
         "amounts": "",
         "facts": [],
+        "stated": [[str.__str__(text) for text in one.row] for one in offered(Path(path), said)],
+        "doubtful": [],
     }
     recognised: Recognition | None = None
     try:
         table = imported(content, name, said)
         points_of(table.columns, table.lines.tolist(), name, Machine())
         recognised, found["example"], found["amounts"] = table.recognised, example(table), amounts(table)
-        found["lines"] = {line: proposed(place) for line, place in table.places.items()}
+        found["lines"] = {line: (*proposed(place), "") for line, place in table.places.items()}
     except CmmUqError as error:
         if (asked := lines_asked(error)) is not None:
             recognised, found["example"], found["lines"] = asked
@@ -87,6 +98,11 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
             [str.__str__(label), str.__str__(text)]
             for label, text in recognised.rows
             if not str.__str__(label).startswith("Column ")
+        ]
+        found["doubtful"] = [
+            f"{str.__str__(fact.label)}: {str.__str__(fact.value)}. Say where each lies, if they differ"
+            for fact in recognised.facts
+            if fact.key == SAME_PLACE
         ]
     found["sheets"] = [sheet.name for sheet in sheets if sheet.name]
     return found | _grid(sheets, tables)

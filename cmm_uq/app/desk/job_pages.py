@@ -66,7 +66,7 @@ _HERE = {
 """What a remedy in words of job.toml is on this page."""
 _OF_ITEM = (
     *("machine.", "artefact.", "job.customer", "job.address", "conformity.limit_um", "conformity.mpe"),
-    *("rated_conditions.", "test_uncertainty."),
+    *("rated_conditions.", "test_uncertainty.", "recording.constant."),
 )  # facts of one thing, or one customer, which another must not get unseen
 
 
@@ -79,12 +79,17 @@ def read_page(draft: Draft, found: Mapping[str, Any], plans: Sequence[str] = ())
     """The reading of an export, whole, and the form that corrects it; ``plans``: files that may say where lines lie."""
     problem, said = found["problem"], draft.keys
     where, _, fix = problem or ("", "", "")
+    open_ = [name in said.get("lines", {}) or not place or "?" in place for name, place, *_ in found["lines"]]
+    asked, placed = (
+        [one for one, own in zip(found["lines"], open_, strict=True) if own is which] for which in (True, False)
+    )
     sheets = [(one, one) for one in found["sheets"]] if len(found["sheets"]) > 1 or said.get("sheet") else []
     return p.page(
         "desk/read.html", DESK, draft=draft, found=found, columns=list(map(_column, found["columns"])), sheets=sheets,
         told=[one for one in (where if where != draft.name else "", here(fix) if fix else "") if one],
         said=lambda name, none="": said.get(name, none), corrected={*said} - {"lines"}, units=[(one, one) for one in _UNITS],
-        plans=[(one, one) for one in plans] if found["lines"] and problem else [],
+        plans=[(one, one) for one in plans] if found["lines"] and problem else [], asked=asked, placed=placed,
+        nothing=NOTHING,
         rows_asked=said.get("points_per_measurement") or "points_per_measurement" in fix,
     )  # fmt: skip
 
@@ -111,12 +116,13 @@ def said_in(form: Mapping[str, str]) -> tuple[dict[str, str], dict[str, Any]]:
 
 
 def fields_page(
-    draft: Draft, kind: str, fields: list[dict[str, str]], last: Mapping[str, str], found: Mapping[str, Any] | None
+    draft: Draft, kind: str, fields: list[dict[str, Any]], last: Mapping[str, str], found: Mapping[str, Any] | None
 ) -> p.WebPage:
-    """The dozen things that a job states, with what was filled in last; ``found``: what a check of them says."""
+    """What a job states, with what the export says and what was filled in last; ``found``: what a check of them says."""
     of_item = _OF_ITEM if last.get("kind") == kind else (*_OF_ITEM, "conformity.")
     again = {key: value for key, value in last.items() if key.startswith(of_item)}
-    filled = draft.values if draft.values else {key: value for key, value in last.items() if key not in again}
+    by_file = {one["key"]: one["value"] for one in fields if one.get("value")}
+    filled = draft.values or {key: value for key, value in last.items() if key not in again} | by_file
     return p.page("desk/fields.html", DESK, draft=draft, kind=kind, fields=fields, filled=filled, again=again, last=last,
                   found=found)  # fmt: skip
 
@@ -241,7 +247,7 @@ def certificate_page(one: JobState, diagnosis: Any, field: bool, warnings: Itera
     return p.page(
         "desk/certificate.html", DESK, one=one, outcome=p.cell_of(p.DECISIONS, one.verdicts.overall),
         decided=list(map(_decided, one.verdicts)), diagnosis=diagnosis, field=field, overall=one.verdicts.overall,
-        not_stated=[text for text in warnings if "not stated" in text],
+        not_stated=[text for text in warnings if "ISO/IEC 17025" in text],
         lacking=[(_by(each), each.missing) for each in one.verdicts if each.missing],
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ import re
 import shutil
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import chdir
 from pathlib import Path
 from typing import Any
@@ -20,13 +20,17 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AbstractTable
 
+from cmm_uq.analysis.conformity.standard import Characteristic
+from cmm_uq.analysis.conformity.standards import names, standard_named
 from cmm_uq.app.commands.forms import shipped
 from cmm_uq.app.commands.jobs.check import Problem, check_job, in_lines
-from cmm_uq.app.commands.jobs.exchange import write_job_of_export
+from cmm_uq.app.commands.jobs.exchange import offered, write_job_of_export
 from cmm_uq.app.commands.jobs.new import job_id, job_of_export, kind_or_refused, known, usual
 from cmm_uq.app.desk.exports import keys_of
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of, value_of
+from cmm_uq.jobs.tables.conformity import LINE_KEYS
+from cmm_uq.machine.model.kind import FORMS, LENGTHS
 
 _PAIR = re.compile(r"\s*([-+−]?\d+(?:[.,]\d+)?)\s*(?:to|…|\.\.\.?|;|/|\s)\s*([-+−]?\d+(?:[.,]\d+)?)\s*")
 _COMMA = re.compile(r"[-+−]?\d+,\d+(?:[eE][-+]?\d+)?")
@@ -41,10 +45,15 @@ _LABELS = {
     "artefact.cte_per_k": "Its coefficient of expansion, 1/K",
     "artefact.length_mm": "Certified length or diameter, mm",
     "conformity.standard": "Standard to decide by",
+    "conformity.characteristic": "Which of its characteristics",
     "conformity.mpe": "Maximum permissible error, µm (L in mm)",
     "conformity.limit_um": "Limit, µm",
     "conformity.rule": "Decision rule",
     "rated_conditions.temperature_c": "Rated temperatures, °C",
+    "rated_conditions.declared.by": "Or who declares that the rated conditions were met",
+    "rated_conditions.declared.reason": "Why",
+    "recording.constant.temp_air_c": "Temperature of the air while it was measured, °C",
+    "recording.constant.temp_artefact_c": "Temperature of the artefact, °C, where its lengths are to be corrected by it",
 }
 _EXAMPLES = {"job.date": "2026-05-31", "job.customer": "", "machine.serial": "9.12.6", "artefact.serial": "SG-4711"}
 _OF_CERTIFICATE = {
@@ -89,10 +98,48 @@ def _wanted(name: str) -> Iterator[tuple[str, Any]]:
             yield f"artefact.{key}", value
         if key == "name":
             yield "artefact.serial", _EXAMPLES["artefact.serial"]
-    for key, value in (begun.get("conformity") or [{}])[0].items():
-        yield f"conformity.{key}", value
-    for table in ("test_uncertainty", "rated_conditions"):
-        yield from ((f"{table}.{key}", value) for key, value in begun.get(table, {}).items())
+    kind = kind_or_refused(known()[name])
+    decided = _decided_on(kind.tested)
+    usually = (begun.get("conformity") or [{}])[0]
+    if decided:
+        limits = {"mpe": "2 + L/300"} if LENGTHS in kind.tested else {}
+        yield from {
+            "conformity.standard": "", "conformity.characteristic": "",
+            **{f"conformity.{key}": value for key, value in (limits | {"limit_um": 4.0} | usually).items()
+               if key not in ("standard", "characteristic")},
+            "conformity.rule": "ISO 14253-1",
+        }.items()  # fmt: skip
+    lines = (
+        {line for _, one in decided for line in one.lines} if LENGTHS in kind.tested or FORMS in kind.tested else {*()}
+    )
+    asked = {key: 1e-6 if line == "expansion" else 0.1 for line, key in LINE_KEYS.items() if line in lines} | begun.get(
+        "test_uncertainty", {}
+    )
+    yield from ((f"test_uncertainty.{key}", value) for key, value in asked.items())
+    if decided:
+        yield "rated_conditions.temperature_c", [18.0, 22.0]
+        yield from ((f"rated_conditions.declared.{key}", "") for key in ("by", "reason"))
+    if kind.table.with_recording:
+        yield from ((f"recording.constant.{column}", 20.1) for column in ("temp_air_c", "temp_artefact_c"))
+
+
+def _decided_on(tested: Collection[str]) -> list[tuple[str, Characteristic]]:
+    """Standards that can be decided on what a kind offers, with each of their characteristics that can."""
+    each = ((name, one) for name in names() if (one := standard_named(name)) is not None)
+    return [(name, own) for name, one in each for own in one.characteristics if own.observed in tested]
+
+
+def _options(kind: str, dotted: str) -> list[list[str]]:
+    """What a field is chosen from; nothing where it is written."""
+    decided = _decided_on(kind_or_refused(known()[kind]).tested)
+    if dotted == "conformity.standard":
+        return [["", "none"], *([name, name] for name in dict.fromkeys(name for name, _ in decided))]
+    if dotted == "conformity.characteristic":
+        of: dict[str, list[str]] = {}
+        for name, one in decided:
+            of.setdefault(one.name, []).append(name)
+        return [["", "the first of the standard"], *([one, f"{one}: {', '.join(those)}"] for one, those in of.items())]
+    return []
 
 
 def _schema_of(schema: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:
@@ -102,8 +149,18 @@ def _schema_of(schema: Mapping[str, Any], dotted: str) -> Mapping[str, Any]:
     return found.get("properties", {}).get(key, {}) or {}
 
 
-def fields(kind: str) -> list[dict[str, str]]:
-    """Fields of the form of a kind: key, label, example, sort, and whether only a whole certificate needs it."""
+_OF_TEST = (
+    "conformity.characteristic",
+    "test_uncertainty.",
+    "rated_conditions.declared",
+    "recording.constant.temp_artefact_c",
+)
+"""What a standard asks of its test besides; the statement of conformity is incomplete without it."""
+_FIELD: dict[str, Any] = {"example": "", "options": [], "further": "", "said": "", "value": ""}
+
+
+def fields(kind: str) -> list[dict[str, Any]]:
+    """Fields of the form of a kind: key, label, example, sort, options, and what alone needs it."""
     schema, found = json.loads(shipped("job")), []
     for dotted, value in _wanted(kind):
         known = _schema_of(schema, dotted)
@@ -114,10 +171,22 @@ def fields(kind: str) -> list[dict[str, str]]:
             label = f"Travel of {dotted[-1].upper()}, lowest to highest reading, mm"
         example = _as_toml(value) if isinstance(value, dict) else _shown(value, dotted)
         sort = "date" if dotted == "job.date" else "text"
-        found.append({"key": dotted, "label": label, "example": example, "sort": sort, "further": ""})
+        options, further = _options(kind, dotted), "test" if dotted.startswith(_OF_TEST) else ""
+        found.append(_FIELD | {"key": dotted, "label": label, "example": example, "sort": sort, "options": options,
+                               "further": further})  # fmt: skip
     for dotted, label in _OF_CERTIFICATE.items():
         sort = "date" if dotted.endswith((".issued", ".date", ".due")) else "text"
-        found.append({"key": dotted, "label": label, "example": "", "sort": sort, "further": "yes"})
+        found.append(_FIELD | {"key": dotted, "label": label, "sort": sort, "further": "yes"})
+    return found
+
+
+def fields_for(kind: str, export: str, keys: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The same with what the export says of each in its head or foot: the words, and the value to begin with."""
+    said = {one.key: one for one in offered(Path(export), keys_of(keys))}
+    found = fields(kind)
+    for one in found:
+        if (own := said.get(one["key"])) is not None:
+            one |= {"said": str(own), "value": own.value if own.taken else ""}
     return found
 
 
@@ -169,7 +238,7 @@ def check_answers(kind: str, export: str, keys: Mapping[str, Any], values: Mappi
         tables = {
             **given,
             "machine": {"name": "?", **given.get("machine", {})},
-            "recording": {"file": path.name, **said},
+            "recording": {"file": path.name, **said, **given.get("recording", {})},
         }
         files = job_of_export(kind, tables, {path.name: content}, id="job")
         if not wrong.problems:

@@ -146,7 +146,7 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "corrected": exports.corrected,
     "remembered": exports.remembered,
     "kinds": questions.kinds,
-    "fields": questions.fields,
+    "fields": questions.fields_for,
     "check_answers": questions.check_answers,
     "check": questions.check_text,
     "create": questions.create,

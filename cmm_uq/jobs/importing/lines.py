@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.csv_table import number_problem
-from cmm_uq.base.messages import Verbatim, say, semicolons
+from cmm_uq.base.messages import Verbatim, commas, say, semicolons
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.columns import COORDINATES
@@ -67,6 +67,7 @@ class MeasuredLengths:
     facts: tuple[Fact, ...]
     left_out: tuple[str, ...]
     places: Stated = field(default_factory=dict)
+    words: Mapping[str, str] = field(default_factory=dict)  # that stand beside each line and no other
 
 
 def placed(
@@ -99,7 +100,11 @@ def placed(
     if not all(bare):
         columns[REFERENCE] = np.array([[0.0, reference] for reference in table.reference], dtype=np.float64).ravel()
     columns |= {name: np.repeat(values, 2) for name, values in table.beside.items()}
-    return columns, (_told(wanted, places, by_file),), [line for line in table.lines for _ in range(2)]
+    return (
+        columns,
+        (_told(wanted, places, by_file), *_same_place(wanted, places)),
+        [line for line in table.lines for _ in range(2)],
+    )
 
 
 def _measured_again(table: MeasuredLengths) -> list[tuple[str, float | None]]:
@@ -128,6 +133,19 @@ def _told(names: Sequence[str], places: Mapping[str, str], by_file: Stated) -> F
         else:
             told.append(say("{name}: {place}", name=line, place=place))
     return Fact("lines", say("Lines"), semicolons(told))
+
+
+SAME_PLACE = "same_place"
+
+
+def _same_place(names: Sequence[str], places: Mapping[str, str]) -> tuple[Fact, ...]:
+    """Lines that begin at one place and go one way, so that whatever they differ by is no error of another place."""
+    at: dict[tuple[float, ...], list[str]] = {}
+    for name in names:
+        at.setdefault(tuple(np.round(np.concatenate(place_of(places[name])), 6).tolist()), []).append(name)
+    told = [say("{names} ({place})", names=commas(map(Verbatim, own)), place=Verbatim(places[own[0]]))
+            for own in at.values() if len(own) > 1]  # fmt: skip
+    return (Fact(SAME_PLACE, say("Lines at the very same place"), semicolons(told)),) if told else ()
 
 
 def place_of(text: str) -> tuple[Floats, Floats]:
@@ -356,9 +374,9 @@ def _axis_of(sheets: Sequence[Sheet]) -> str:
     return next(filter(None, map(axis_in, texts)), "1")
 
 
-def axis_place(name: str) -> tuple[str, str]:
+def axis_place(name: str) -> tuple[str, str, str]:
     """Where an axis of runs lies, as far as its name says, and an example: it reads 0 where it lies at 0."""
     axis = name if name in "XYZ" else ""
     known = ",".join("0" if one == axis else "?" for one in "XYZ")
     begins = ",".join("0" if one == (axis or "X") else str(100 * k) for k, one in enumerate("XYZ", 1))
-    return f"along {axis} from {known}" if axis else "", f"along {axis or 'X'} from {begins}"
+    return f"along {axis} from {known}" if axis else "", f"along {axis or 'X'} from {begins}", ""

@@ -32,7 +32,7 @@ from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sum
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
 from cmm_uq.jobs.importing.lengths.places import says_figures
-from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, stated_places
+from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, stated_places, words_beside
 from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths, axis_in
@@ -358,7 +358,7 @@ class Understanding:
         bare_ = [None if np.isnan(one) else float(one) for one in reference]
         return MeasuredLengths(
             *(lines, bare_, runs.tolist(), measured.tolist(), own.lines, own.covariates, self.sources),
-            *(self.facts(of_unit, used), tuple(self.left_out), places),
+            *(self.facts(of_unit, used), tuple(self.left_out), places, words_beside(lines, stated)),
         )
 
     def axis_places(self, runs: Sequence[AxisRun]) -> dict[str, tuple[str, str]]:

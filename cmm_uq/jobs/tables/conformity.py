@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from cmm_uq.base.errors import suggestion
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import (
     LARGEST_UM,
@@ -28,6 +27,7 @@ from cmm_uq.base.files.table import (
 )
 from cmm_uq.base.messages import Text
 from cmm_uq.base.values import dataclass, field
+from cmm_uq.jobs.tables.adoptions import nearest
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
 from cmm_uq.jobs.tables.length_formula import FLATTEST, Permissible
@@ -286,7 +286,7 @@ class ConformityFacts(JobTable):
     def _known(cls, name: str, info: ValidationInfo) -> str:
         standards = standards_in(info)
         if standards is not None and standards.named(name) is None:
-            raise ValueError(f"no such standard is decided. {suggestion(name, standards.names())}")
+            raise ValueError(f"no such standard is decided. {nearest(name, standards.names())}")
         return name
 
     @model_validator(mode="before")

@@ -178,7 +178,7 @@ def test_where_runs_lie_is_asked_with_what_their_axis_says(tmp_path: Path) -> No
     path = tmp_path / "x.rtl"
     path.write_text(written(), encoding="utf-8")
     asked = read(str(path), {})
-    assert asked["lines"] == [("X", "along X from 0,?,?", "along X from 0,200,300")]
+    assert asked["lines"] == [("X", "along X from 0,?,?", "along X from 0,200,300", "")]
     assert asked["example"] == "axis X, run 1: 0 mm, +0 µm"
     whole = read(str(path), {"lines": {"X": "along X from 0,200,300"}})
     assert whole["problem"] is None

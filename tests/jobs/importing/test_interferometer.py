@@ -84,7 +84,7 @@ def test_where_the_axis_lies_is_asked_for() -> None:
     with pytest.raises(CmmUqError, match="nothing says where line 'X' lies") as error:
         read(written(), ImportKeys())
     assert "along X from 0,200,300" in error.value.fix
-    asked = {"X": ("along X from 0,?,?", "along X from 0,200,300")}
+    asked = {"X": ("along X from 0,?,?", "along X from 0,200,300", "")}
     assert lines_asked(error.value) == (None, "axis X, run 1: 0 mm, +0 µm", asked)
     assert axis_place("Z")[1] == "along Z from 100,200,0"
 

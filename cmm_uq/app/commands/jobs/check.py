@@ -21,12 +21,13 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES, content_of
 from cmm_uq.base.files.toml_file import line_of
-from cmm_uq.base.messages import html_table
+from cmm_uq.base.messages import Text, html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.clauses import Requirement, certifies, clauses, contradictions, missing
 from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.lines import SAME_PLACE
 from cmm_uq.jobs.importing.recording import is_own, read_recording
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import PART, is_part
@@ -42,6 +43,7 @@ _KEY_BEHIND = re.compile(r"(?P<file>\S.*?\.toml) (?P<key>\[.*)", re.DOTALL)
 """Where a message names the key behind the file without a colon."""
 
 _NOT_STATED = "not stated: "
+_LACKING = "will be no complete test, for it lacks "
 _ROWS = (".csv", ".txt", ".tsv")  # of a file whose lines are rows
 _TABLE_KEY = re.compile(r"\[+([^\]]+)\]+ ?([\w.]*)")
 
@@ -83,11 +85,19 @@ def in_lines(problems: Sequence[Problem]) -> tuple[str, ...]:
         alike: object = one
         if one.problem.startswith(_NOT_STATED):
             alike = one.file
+        elif _LACKING in one.problem:
+            alike = (one.key, _LACKING)
         elif one.line and one.file.endswith(_ROWS):
             alike = (one.file, one.key, re.sub(r"'[^']*'|[\d.]+", "…", one.problem), one.fix)
         together.setdefault(alike, []).append(one)
     return tuple(
-        str(each[0]) if len(each) == 1 else _not_stated(alike, each) if isinstance(alike, str) else _of_rows(each)
+        _lacking_together(each)
+        if _LACKING in each[0].problem
+        else str(each[0])
+        if len(each) == 1
+        else _not_stated(alike, each)
+        if isinstance(alike, str)
+        else _of_rows(each)
         for alike, each in together.items()
     )
 
@@ -100,6 +110,22 @@ def _not_stated(file: str, every: Sequence[Problem]) -> str:
     keys = "; ".join(f"{table} {', '.join(dict.fromkeys(keys))}" for table, keys in tables.items())
     fix = "Give them for a certificate; cmm-uq check JOB --clauses says what each is"
     return str(Problem(f"{_NOT_STATED}what ISO/IEC 17025:2017, 7.8 asks for: {keys}", file, fix=fix))
+
+
+_UNSTATED = re.compile(r"uncertainty: (?P<line>.*) is neither stated nor declared negligible \((?P<key>\w+) in .*\)")
+
+
+def _lacking_together(every: Sequence[Problem]) -> str:
+    """What one statement lacks, the lines of its uncertainty with their keys as one."""
+    by, each = every[0].problem.partition(_LACKING)[0], [one.problem.partition(_LACKING)[2] for one in every]
+    lines = [match for one in each if (match := _UNSTATED.fullmatch(one))]
+    whole = [one for one in each if not _UNSTATED.fullmatch(one)]
+    if lines:
+        named, keys = (", ".join(match[group] for match in lines) for group in ("line", "key"))
+        whole.append(
+            f"uncertainty of {named} ({keys} in [test_uncertainty], or declared in [test_uncertainty.negligible])"
+        )
+    return str(replace(every[0], problem=f"{by}{_LACKING}{'; '.join(whole)}"))
 
 
 def _of_rows(every: Sequence[Problem]) -> str:
@@ -234,16 +260,26 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     model, findings = recorded_model(job)
     with wrong.going_on():
         model.estimate()
-    for i, _ in enumerate(facts.conformity, 1):
+    undecided = list[Problem]()
+    for i, wish in enumerate(facts.conformity, 1):
         with wrong.going_on():
-            decision(job, model, findings, i)
+            found = decision(job, model, findings, i)
+            by = f"{wish.standard} {found.characteristic}"
+            undecided += [
+                _lacking(job.folder / "job.toml", f"[[conformity]] {i}", by, one) for one in found.missing_with_remedies
+            ]
     if job.further:
         from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
 
         with wrong.going_on():
             further_certificates(job, job, verify_further(job))
     lines = ((one, one.lines[0] if one.lines else None) for one in findings)
-    return [Problem(str(one.why), job.recording_path, line, one.column or "") for one, line in lines]
+    return undecided + [Problem(str(one.why), job.recording_path, line, one.column or "") for one, line in lines]
+
+
+def _lacking(path: Path, key: str, by: str, what: Text) -> Problem:
+    """What a statement of conformity lacks of its standard's test, by which it cannot be a pass."""
+    return Problem(f"{by} {_LACKING}{str.__str__(what)}", str(path), key=key)
 
 
 def _to_be_known(job: Job, path: Path) -> list[Problem]:
@@ -252,6 +288,15 @@ def _to_be_known(job: Job, path: Path) -> list[Problem]:
         return [Problem(said, str(path), key="[job] origin", fix="Put in your own readings for a certificate")]
     content = job.inputs["job.toml"].decode("utf-8-sig")
     problems = [Problem(str(text), str(path)) for text in contradictions(job)]
+    for fact in (fact for read in job.imported for fact in read.facts if fact.key == SAME_PLACE):
+        said = f"{str.__str__(fact.label)[0].lower()}{str.__str__(fact.label)[1:]}: {str.__str__(fact.value)}"
+        problems.append(Problem(said, str(path), key="[recording] lines", fix="Say where each lies, if they differ"))
+    if kind_of(job).tested and not job.facts.conformity:
+        said, fix = (
+            "nothing will be decided: no standard and no limit is stated",
+            "Give both, where more is wanted than a calibration",
+        )
+        problems.append(Problem(said, str(path), key="[[conformity]] standard", fix=fix))
     for one in missing(job) if certifies(job) else ():
         text = f"{_NOT_STATED}{one.asks} ({one.clause}), which ISO/IEC 17025:2017 asks for"
         problems.append(Problem(text, str(path), _line_of(one.key, content), one.key, f"Give {one.key}"))

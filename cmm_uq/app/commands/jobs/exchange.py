@@ -20,7 +20,8 @@ from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.importing.answers import as_file, folder, matching, path_of
-from cmm_uq.jobs.importing.format import ImportKeys, Recognition
+from cmm_uq.jobs.importing.cells.stated import Offer, offers
+from cmm_uq.jobs.importing.format import ImportKeys, Recognition, format_of
 from cmm_uq.jobs.importing.lengths.placing import proposed as proposed
 from cmm_uq.jobs.importing.lines import UnplacedRunsError, axis_place
 from cmm_uq.jobs.importing.recording import (
@@ -58,6 +59,12 @@ def remember(name: str, keys: ImportKeys, head: tuple[str, ...]) -> Path:
     return path
 
 
+def offered(path: Path, keys: ImportKeys) -> tuple[Offer, ...]:
+    """What an export says of its measurement around the table."""
+    content = content_of(path, TABLE_BYTES, "Check its name")
+    return offers(format_of(content, str(path)), content, str(path), keys)
+
+
 @naming_package()
 def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
     content = content_of(path, TABLE_BYTES, "Check its name")
@@ -66,18 +73,19 @@ def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
     return found
 
 
-def lines_asked(error: CmmUqError) -> tuple[Recognition | None, str, dict[str, tuple[str, str]]] | None:
+def lines_asked(error: CmmUqError) -> tuple[Recognition | None, str, dict[str, tuple[str, str, str]]] | None:
     """How lengths or runs were read of which nothing says where they lie: the reading, its first in words, lines by name.
 
-    Of each line its place as far as the file says it, with ? for what it leaves open, and an example of one.
+    Of each line its place as far as the file says it, with ? for what it leaves open, an example of one, and its words.
     """
     if isinstance(error, UnplacedRunsError):
         return None, error.example, {name: axis_place(name) for name in error.names}
     if not isinstance(error, UnplacedError):
         return None
     places = {name: place for one in error.lengths for name, (place, _) in one.places.items()}
-    every = dict.fromkeys(name for one in error.lengths for name in one.names)
-    return error.recognised, example(error.lengths), {name: proposed(places.get(name, "")) for name in every}
+    words = {name: beside for one in error.lengths for name, beside in one.words.items()}
+    lines = {name: (*proposed(places.get(name, ""), f"{name}; {beside}"), beside) for name, beside in words.items()}
+    return error.recognised, example(error.lengths), lines
 
 
 def amounts(read: ImportedTable) -> str:

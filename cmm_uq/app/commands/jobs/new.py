@@ -30,11 +30,14 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM, Truth
+from cmm_uq.jobs.importing.cells.stated import Offer, offers
+from cmm_uq.jobs.importing.format import FileKeys, format_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
 from cmm_uq.machine.model.kind import MACHINE, Beginning, Kind
 from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.stated import physics_of
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
@@ -208,18 +211,40 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
     if not given.get("machine", {}).get("name"):
         wrong.tell("the machine that was measured has no name", fix='Give --machine "…"')
     if "date" not in given.get("job", {}):
-        fix = "Give the date of measurement: --set job.date=2026-05-31"
-        wrong.tell("an export does not say when it was measured", where="[job] date", fix=fix)
+        by_file = _day_in(given.get("recording", {}), files)
+        fix = f"Give the date of measurement: --set job.date={by_file.value if by_file and by_file.value else '2026-05-31'}"
+        said = f"no date is given, and the file has it in line {by_file.line}: {by_file.words}" if by_file else ""
+        wrong.tell(said or "an export does not say when it was measured", where="[job] date", fix=fix)
     wrong.refuse()
     bare = replace(begin, artefact={}, conformity=None, test={})
     whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": nested(given.get("machine", {}))}
     if "effects" not in given.get("model", {}):  # what the export has no column for it cannot tell
         read = read_new(found, whole, files)
         with physics_of(read):  # an arm has as many effects as joints
-            known = [one for name in begin.effects if (one := every().get(name)) is not None]
-        named = [one.name for one in known if set(one.columns) <= set(read.points.columns)]
+            every_one = [one for name in begin.effects if (one := every().get(name)) is not None]
+            able = [one for one in every_one if set(one.columns) <= set(read.points.columns)]
+            named = [one.name for one in able if not found.by_effects or _seen(one, found, read)]
         whole["model"] = {**whole["model"], "effects": named}
     return job_files(found.name, whole, files, begin=begin)
+
+
+def _seen(effect: Effect, kind: Kind, job: Job) -> bool:
+    """Whether an effect changes anything that was read, as the scale of an axis without runs does not."""
+    try:
+        artefact = kind.observing("reported")(job.facts.artefact, job.points, where=job.recording_path)
+    except CmmUqError:  # which check and report say of the job
+        return True
+    points = artefact.points
+    return bool(effect.shape) or bool(np.any(artefact.project(points.xyz, points.on_artefact(effect.basis(points)))))
+
+
+def _day_in(recording: Mapping[str, Any], files: Mapping[str, bytes]) -> Offer | None:
+    """When an export says that it was measured."""
+    name, keys = str(recording.get("file", "")), {k: v for k, v in recording.items() if k in FileKeys.model_fields}
+    if name not in files:
+        return None
+    found = offers(format_of(files[name], name), files[name], name, FileKeys.model_validate(keys))
+    return next((one for one in found if one.key == "job.date"), None)
 
 
 @naming_package()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -14,6 +15,10 @@ from cmm_uq.jobs.importing.lengths.places import full_place, place_of_line, plac
 _NEAR_MM = 1.0  # by which places are rounded
 _SHOWN = 160  # characters of the words of a place
 _LABEL = 30  # characters of the name of a line elsewhere
+_WORDS = 60  # characters of what stands beside a line
+_DIAGONAL = re.compile(
+    r"diag|[uú]hlop|przek|átló|köşegen|対角|对角|對角|대각|диагон|(?<![^\W_])(?:XY|XZ|YZ|XYZ)(?![^\W_])", re.IGNORECASE
+)
 Elsewhere = Sequence[tuple[str, str, str]]
 """Rows that are no lengths: the first cell of each, its text, and its sheet."""
 
@@ -114,12 +119,28 @@ def _in_mm(place: str, mm: float) -> str:
     )
 
 
-def proposed(place: str) -> tuple[str, str]:
-    """A place as far as a file says it, and an example of one.
+def words_beside(names: Sequence[str], texts: Sequence[str]) -> dict[str, str]:
+    """What a file says beside all lengths of a line and of no other: of a line ``4`` that it is ``Diagonal A``."""
+    own: dict[str, list[str]] = {}
+    for name, text in zip(names, texts, strict=True):
+        parts = [one.strip() for one in text.split("\n")]
+        own[name] = [one for one in own.get(name, parts) if one in parts]
+    count = Counter(part for parts in own.values() for part in {*parts})
+    return {
+        name: "; ".join(one for one in dict.fromkeys(parts) if one and one != name and count[one] == 1)[:_WORDS]
+        for name, parts in own.items()
+    }
+
+
+def proposed(place: str, words: str = "") -> tuple[str, str]:
+    """A place as far as a file says it, and an example of one, with two ends where the words are of a diagonal.
 
     Examples
     --------
-    >>> proposed("along Y from ?,?,?"), proposed("along X from ?,800,400")[0]
-    (('', 'along Y from 100,200,300'), 'along X from ?,800,400')
+    >>> proposed("along Y from ?,?,?"), proposed("along X from ?,800,400")[0], proposed("", "Diagonal A")[1]
+    (('', 'along Y from 100,200,300'), 'along X from ?,800,400', 'from 100,200,300 to 500,600,700')
     """
-    return place if re.search(r"\d", place) else "", place.replace("?,?,?", "100,200,300") or "along X from 100,200,300"
+    axes = {one[-1] for one in said_in([words]).axes}
+    axis = axes.pop() if len(axes) == 1 else "" if _DIAGONAL.search(words) else "X"
+    example = f"along {axis} from 100,200,300" if axis else "from 100,200,300 to 500,600,700"
+    return place if re.search(r"\d", place) else "", place.replace("?,?,?", "100,200,300") or example
