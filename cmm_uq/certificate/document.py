@@ -12,6 +12,7 @@ import datetime as dt
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from contextvars import ContextVar
 from functools import cache
 from typing import Any, ClassVar, Literal
 
@@ -52,6 +53,9 @@ def view_words(language: Code) -> dict[str, Any]:
 
 
 Outcome = Literal["pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"]
+
+
+NOT_LETTERED: ContextVar[str] = ContextVar("what to install for characters that no font had", default="")
 
 
 @dataclass(frozen=True)

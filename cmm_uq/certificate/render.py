@@ -74,6 +74,7 @@ SMALLEST = 0.66  # of a picture's width: its lettering is 5 pt then
 _PAGE = 256.0  # height of the text
 _BROWSER = 1.3  # times as high as in the PDF is what a browser prints
 _MEASURED = 0.85  # of the height that is reckoned from letters, what Typst makes of it
+_NAMED = 12  # characters without a font that are shown
 _LONG, _NAME = 130, 45  # letters from which a text is given by its beginning, and least letters of that
 _CUT = re.compile(r"(?<=[.;:])\s|(?<=[。；：])")
 _IN_FULL = say("In full behind this page.")
@@ -263,6 +264,7 @@ def _with_fallback(content: dict[str, Any], language: Code, **how: Any) -> bytes
     from typst import TypstError
 
     folders, missing = [str(file.parent) for file in fonts_of(language)], list[str]()
+    doc.NOT_LETTERED.set("")
     content = {**content, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
     for system_fonts in (False, False, True, True):
         try:
@@ -297,6 +299,31 @@ def _compile(
     )  # fmt: skip
 
 
+_SCRIPTS = (  # letters, what they are called, a font that has them, and its package
+    (re.compile("[\u3040-\u30ff]"), "Japanese", "IPAexGothic", "pip install 'cmm-uq[ja]'"),
+    (re.compile("[\u1100-\u11ff\uac00-\ud7a3]"), "Korean", "Noto Sans CJK KR", "fonts-noto-cjk"),
+    (re.compile("[\u2e80-\u9fff\uff00-\uffef]"), "Chinese", "Noto Sans CJK SC", "fonts-noto-cjk"),
+    (re.compile("[\u0590-\u05ff]"), "Hebrew", "Noto Sans Hebrew", "fonts-noto-core"),
+    (re.compile("[\u0600-\u06ff]"), "Arabic", "Noto Sans Arabic", "fonts-noto-core"),
+    (re.compile("[\u0900-\u0dff]"), "Indic", "Noto Sans", "fonts-noto-core"),
+    (re.compile("[\u0e00-\u0e7f]"), "Thai", "Noto Sans Thai", "fonts-noto-core"),
+)
+
+
+def _fonts_for(missing: Sequence[str]) -> tuple[str, str]:
+    """Names of fonts that have characters which no font here has, and the sentence that says what to install."""
+    text = "".join(missing)
+    own = [one for one in _SCRIPTS if one[0].search(text)] or [(_TAG, "such", "Noto Sans", "fonts-noto")]
+    fonts = ", ".join(dict.fromkeys(font for *_, font, _ in own))
+    packages = ", ".join(dict.fromkeys(package for *_, package in own))
+    named = ", ".join(dict.fromkeys(script for _, script, *_ in own))
+    shown = f"{text[:_NAMED]}{' …' if len(text) > _NAMED else ''}"
+    return fonts, (
+        f"The PDF shows □ in place of {shown}: no font on this machine has {named} letters. Install {fonts} ({packages}), "
+        "and make it again; the HTML view shows them in the reader's fonts."
+    )
+
+
 def _without(content: dict[str, Any], missing: list[str]) -> dict[str, Any]:
     """The content with □ for every missing character, and their codes for the line that says so."""
     table = str.maketrans(dict.fromkeys(missing, "□"))
@@ -308,8 +335,10 @@ def _without(content: dict[str, Any], missing: list[str]) -> dict[str, Any]:
             return [shown(item) for item in value]
         return value.translate(table) if isinstance(value, str) else value
 
+    fonts, told = _fonts_for(missing)
+    doc.NOT_LETTERED.set(told)
     codes = ", ".join(f"U+{ord(character):04X}" for character in missing)
-    return {**content, "document": shown(content["document"]), "missing": codes}
+    return {**content, "document": shown(content["document"]), "missing": f"{codes} ({fonts})"}
 
 
 WIDTH_MM, HEIGHT_MM = 84.0, 8.0

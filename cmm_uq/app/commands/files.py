@@ -15,7 +15,7 @@ from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import NOTHING, Text
 from cmm_uq.base.output import Ledger, Owner, staged
 from cmm_uq.base.values import dataclass, replace
-from cmm_uq.certificate.document import translated as said
+from cmm_uq.certificate.document import NOT_LETTERED, translated as said
 from cmm_uq.certificate.origin import as_json, file_name, made_after, marked
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.result import Outcome
@@ -217,6 +217,7 @@ class Form:
             files = place.write(contents, ledger=ledger)
             by_name = "; the machine has no [machine] serial and is known by its name"
             recorded = kept.said("" if job.facts.machine.serial else by_name)
+            recorded = " ".join(filter(None, (recorded, NOT_LETTERED.get())))
         stage("Done", 1.0)
         ends = (found.summary, found.conforming, job.facts.job.id, job.origin, recorded)
         return Written(found, contents[RESULTS], files, *ends)

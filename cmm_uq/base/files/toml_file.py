@@ -126,8 +126,11 @@ def checked(
     try:
         data = toml_of(text, str(path), most_word=most_word, most_listed=most_listed)
     except tomllib.TOMLDecodeError as error:
-        raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
-                         fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
+        raise _said_twice(str(error), text, str(path)) or CmmUqError(
+            f"is not valid TOML: {error}",
+            where=str(path),
+            fix="Text stands in quotes, dates as 2026-01-31, decimals with a point",
+        ) from None
     data = data if beside is None else beside(data)
     table = cast("type[Facts]", model if isinstance(model, type) else model(data))
     try:
@@ -262,6 +265,33 @@ def _table_of(parents: list[str], top: type[BaseModel]) -> type[BaseModel] | Non
         model = next((candidate for candidate in candidates if hasattr(candidate, "model_fields")), annotation)
         by_name = get_origin(annotation) is dict
     return model if isinstance(model, type) and issubclass(model, BaseModel) else None
+
+
+_TWICE = re.compile(r"Cannot (?:declare|mutate|overwrite).*\(at line (\d+)")
+_NAMED = re.compile(r"""\s*(?:\[{1,2}([^\[\]]+)\]|([\w."' -]+?)\s*=)""")
+
+
+def _said_twice(error: str, text: str, where: str) -> CmmUqError | None:
+    """Of a table or key that stands in a file twice, as ``[artefact.certificate]`` beside ``certificate = { … }``."""
+    at, lines, table = _TWICE.search(error), text.splitlines(), ""
+    places: dict[int, str] = {}  # dotted name that each line states
+    for number, line in enumerate(lines, 1):
+        if named := _NAMED.match(line):
+            table = table if named[1] is None else named[1].replace(" ", "")
+            places[number] = table if named[2] is None else f"{table}.{named[2].strip()}".removeprefix(".")
+    own = places.get(int(at[1])) if at else None
+    if at is None or own is None:
+        return None
+    parts = own.split(".")
+    wholes = {".".join(parts[:count]) for count in range(len(parts), 0, -1)}
+    others = [number for number, name in places.items() if number != int(at[1]) and name in wholes
+              and not (lines[number - 1].lstrip().startswith("[") and name != own)]  # fmt: skip
+    if not others:
+        return None
+    name, other = places[others[0]], others[0]
+    fix = f"Keep one of both: write all keys of [{name}] below its heading, or all of them in the line of its key"
+    return CmmUqError(f"states {name} twice: in line {other} and in line {at[1]}", where=f"{where} line {at[1]}",
+                      fix=fix if "{" in lines[other - 1] + lines[int(at[1]) - 1] else "Keep one of them")  # fmt: skip
 
 
 def line_of(keys: list[str], text: str) -> int | None:

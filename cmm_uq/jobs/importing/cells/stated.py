@@ -11,10 +11,10 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.importing.cells.encodings import decoded, is_number
 from cmm_uq.jobs.importing.format import FileKeys, Format, ImportKeys
 from cmm_uq.jobs.importing.header import text_of
