@@ -38,12 +38,13 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
         for line, count in counts.items()
         if count < wanted
     )
+    lines = list(_first_lines(artefact, copies)) if absent else []
+    too_short = tuple(plans.too_short(line, artefact.points.machine, lines) for line in absent)
     every = list(counts.values())
     span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
     return (
         Condition(
-            say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked,
-            tuple(_too_short(line, artefact, copies) for line in absent),
+            say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked, too_short
         ),
         _long_enough(plan, artefact.points.machine, often),
         Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing),
@@ -55,30 +56,13 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
     )
 
 
-def _too_short(position: Text, artefact: Artefact, copies: Mapping[int, int]) -> Text:
-    """A position that is missing, with the line of its direction that crosses most of the travel, and is no such diagonal."""
-    found, points = artefact.indications(), artefact.points
-    axes = str.__str__(position).rpartition("diagonal ")[2]
-    nearest: tuple[float, int, str] | None = None
-    if found is None or position not in (*plans.SPACE_DIAGONALS, *plans.FACE_DIAGONALS):
-        return position
-    original = np.flatnonzero(~np.isin(points.group[found.rows[:, 0]], list(copies)))
-    middles, along = artefact.lines_of(found.rows)
-    for i in original[np.unique(points.measurement[found.rows[original, 0]], return_index=True)[1]]:
-        if str.__str__(plans.position_on(points.machine, middles[i], along[i])) == f"oblique {axes}":
-            shares = plans.crossed_shares(points.machine, middles[i], along[i])
-            named = [k for k, axis in enumerate(AXES) if axis.upper() in axes]
-            least = min(named, key=lambda k: shares[k])
-            one = float(shares[least]), int(points.measurement[found.rows[i, 0]]), AXES[least].upper()
-            nearest = max(nearest or one, one, key=lambda of: of[0])
-    if nearest is None:
-        return position
-    share, measurement, axis = nearest
-    return say(
-        "{position} (measurement {measurement} lies along it, but its line crosses {share:.0f} % of the travel of {axis}, "
-        "less than {least:.0f} %)", position=position, measurement=measurement, share=np.floor(100 * share),
-        axis=Verbatim(axis), least=100 * plans.CORNER_TO_CORNER,
-    )  # fmt: skip
+def _first_lines(artefact: Artefact, copies: Mapping[int, int]) -> Iterator[tuple[int, Floats, Floats]]:
+    """Of each measurement that is no copy its number, with the middle and the direction of its line."""
+    if (found := artefact.indications()) is not None:
+        group, (middles, along) = artefact.points.group[found.rows[:, 0]], artefact.lines_of(found.rows)
+        numbers = artefact.points.measurement[found.rows[:, 0]]
+        first = (i for i in np.unique(group, return_index=True)[1] if group[i] not in copies)
+        yield from ((int(numbers[i]), middles[i], along[i]) for i in first)
 
 
 def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -48,10 +48,33 @@ def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float
     return _crossed(*_line(machine, middle, direction))
 
 
-def crossed_shares(machine: Machine, middle: Floats, direction: Floats) -> Floats:
-    """Part of the travel of each axis (3,) that a line through ``middle`` (3,) crosses, where travel is stated."""
-    u = np.abs(direction / np.linalg.norm(direction))
-    return np.asarray((crossed_travel(machine, middle, direction) or 0.0) * u / np.ptp(machine.travel_mm, axis=1))
+def too_short(position: Text, machine: Machine, lines: Sequence[tuple[int, Floats, Floats]]) -> Text:
+    """A diagonal that is missing, with the line of its direction that crosses most of the travel and is none.
+
+    lines : number of the measurement, middle (3,) and direction (3,) of each.
+    """
+    axes = str.__str__(position).rpartition("diagonal ")[2]
+    nearest = (0.0, "", -1)
+    for number, middle, direction in lines:
+        if str.__str__(position_on(machine, middle, direction)) == f"oblique {axes}":
+            u = np.abs(direction / np.linalg.norm(direction))
+            shares = (crossed_travel(machine, middle, direction) or 0.0) * u / np.ptp(machine.travel_mm, axis=1)
+            own = min(
+                (float(share), axis.upper()) for share, axis in zip(shares, AXES, strict=True) if axis.upper() in axes
+            )
+            nearest = max(nearest, (*own, number))
+    share, axis, measurement = nearest
+    if not axis:
+        return position
+    return say(
+        "{position} (measurement {measurement} lies along it, but its line crosses {share:.0f} % of the travel of {axis}, "
+        "less than {least:.0f} %)",
+        position=position,
+        measurement=measurement,
+        share=float(np.floor(100 * share)),
+        axis=Verbatim(axis),
+        least=100 * CORNER_TO_CORNER,
+    )
 
 
 Numbers = tuple[float, ...]

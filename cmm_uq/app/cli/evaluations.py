@@ -11,9 +11,8 @@ import typer
 
 from cmm_uq import __version__
 from cmm_uq.app.cli import options as opt
-from cmm_uq.app.cli.jobs import show_imported
 from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
-from cmm_uq.app.cli.summary import conclude, screen_layout
+from cmm_uq.app.cli.summary import conclude, screen_layout, show_imported
 from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, say, show
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH

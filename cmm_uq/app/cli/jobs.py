@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json as json_text
 import re
-import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -14,7 +13,14 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.asking import job_answers, part_answers
 from cmm_uq.app.cli.options import Ending, argument, flag, job_folder, option
-from cmm_uq.app.cli.summary import conclude_derived, put_manifest, screen_layout
+from cmm_uq.app.cli.summary import (
+    conclude_derived,
+    put_manifest,
+    screen_layout,
+    show_offered,
+    show_proposed,
+    show_recognised,
+)
 from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, put, say, show
 from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.files.limits import value_of
@@ -22,9 +28,7 @@ from cmm_uq.base.files.limits import value_of
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck
     from cmm_uq.certificate.wording import Summary
-    from cmm_uq.jobs.importing.cells.stated import Offer
-    from cmm_uq.jobs.importing.format import ImportKeys, Recognition
-    from cmm_uq.jobs.job import Job
+    from cmm_uq.jobs.importing.format import ImportKeys
 
 _COLUMN = (
     'Column of the recording and of the file: x_mm="X actual", or its number: x_mm=3; of two points in a row: x_mm=3,6.'
@@ -260,39 +264,6 @@ def _setting(text: str) -> tuple[str, str | int]:
     if not equals or not name:
         raise CmmUqError(f"{text!r} says nothing", where="--column, --key", fix='Write it as x_mm="X actual"')
     return name, int(value) if value.isdecimal() else value.strip("\"'")
-
-
-def show_recognised(recognised: Recognition) -> None:
-    show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
-
-
-def show_offered(offers: Sequence[Offer]) -> None:
-    """What the file says of its measurement, and the options of ``cmm-uq new`` that take it over."""
-    if offers:
-        table = screen_layout(verbose=True).table([one.row for one in offers])
-        show([(("Said of the measurement", "bold"),), *table, ()])
-    taken = " ".join(f"--set {shlex.quote(one.setting)}" for one in offers if one.taken)
-    if taken:
-        say(f"To take it over, where it is right, with cmm-uq new --from: {taken}")
-
-
-def show_proposed(recognised: Recognition | None, example: str, places: Mapping[str, tuple[str, str, str]]) -> None:
-    """How lengths were read, and the question where their lines lie, as options of the command."""
-    if recognised is not None:
-        show_recognised(recognised)
-    asked = {name: own for name, own in places.items() if not own[0] or "?" in own[0]}
-    say(f"Read as: {example}")
-    planned = ", or --plan plan.csv where they were planned" if recognised is not None else ""
-    say(f"Where they lie, with figures in mm for each ?{planned}:")
-    for name, (place, like, words) in asked.items():
-        beside = f"   # the file says: {words}" if words else ""
-        say(f'  --line "{name}={place or re.sub("[0-9]+", "?", like)}"{beside}')
-
-
-def show_imported(job: Job, *, silent: bool) -> None:
-    """What was recognised of the files of a job that were imported, before anything is computed of them."""
-    for recognised in () if silent else job.imported:
-        show_recognised(recognised)
 
 
 def check(

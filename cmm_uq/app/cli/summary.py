@@ -7,6 +7,8 @@ On a terminal texts are folded at spaces, and shortened unless everything is ask
 from __future__ import annotations
 
 import json as json_text
+import re
+import shlex
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
@@ -25,6 +27,9 @@ if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Written
     from cmm_uq.certificate.document import Standing
     from cmm_uq.certificate.wording import Summary
+    from cmm_uq.jobs.importing.cells.stated import Offer
+    from cmm_uq.jobs.importing.format import Recognition
+    from cmm_uq.jobs.job import Job
 
 FILES = {
     "certificate.html": "the certificate",
@@ -220,3 +225,36 @@ def conclude_derived(
 def put_manifest(files: Mapping[str, Path]) -> None:
     """The manifest of what was written, and the folder, as JSON."""
     put_data({**json_text.loads(files[MANIFEST].read_bytes()), "folder": folder_of(files)})
+
+
+def show_recognised(recognised: Recognition) -> None:
+    show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
+
+
+def show_offered(offers: Sequence[Offer]) -> None:
+    """What the file says of its measurement, and the options of ``cmm-uq new`` that take it over."""
+    if offers:
+        table = screen_layout(verbose=True).table([one.row for one in offers])
+        show([(("Said of the measurement", "bold"),), *table, ()])
+    taken = " ".join(f"--set {shlex.quote(one.setting)}" for one in offers if one.taken)
+    if taken:
+        say(f"To take it over, where it is right, with cmm-uq new --from: {taken}")
+
+
+def show_proposed(recognised: Recognition | None, example: str, places: Mapping[str, tuple[str, str, str]]) -> None:
+    """How lengths were read, and the question where their lines lie, as options of the command."""
+    if recognised is not None:
+        show_recognised(recognised)
+    asked = {name: own for name, own in places.items() if not own[0] or "?" in own[0]}
+    say(f"Read as: {example}")
+    planned = ", or --plan plan.csv where they were planned" if recognised is not None else ""
+    say(f"Where they lie, with figures in mm for each ?{planned}:")
+    for name, (place, like, words) in asked.items():
+        beside = f"   # the file says: {words}" if words else ""
+        say(f'  --line "{name}={place or re.sub("[0-9]+", "?", like)}"{beside}')
+
+
+def show_imported(job: Job, *, silent: bool) -> None:
+    """What was recognised of the files of a job that were imported, before anything is computed of them."""
+    for recognised in () if silent else job.imported:
+        show_recognised(recognised)

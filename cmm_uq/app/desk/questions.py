@@ -104,11 +104,15 @@ def _wanted(name: str) -> Iterator[tuple[str, Any]]:
     if decided:
         limits = {"mpe": "2 + L/300"} if LENGTHS in kind.tested else {}
         yield from {
-            "conformity.standard": "", "conformity.characteristic": "",
-            **{f"conformity.{key}": value for key, value in (limits | {"limit_um": 4.0} | usually).items()
-               if key not in ("standard", "characteristic")},
+            "conformity.standard": "",
+            "conformity.characteristic": "",
+            **{
+                f"conformity.{key}": value
+                for key, value in (limits | {"limit_um": 4.0} | usually).items()
+                if key not in ("standard", "characteristic")
+            },
             "conformity.rule": "ISO 14253-1",
-        }.items()  # fmt: skip
+        }.items()
     lines = (
         {line for _, one in decided for line in one.lines} if LENGTHS in kind.tested or FORMS in kind.tested else {*()}
     )
@@ -172,8 +176,10 @@ def fields(kind: str) -> list[dict[str, Any]]:
         example = _as_toml(value) if isinstance(value, dict) else _shown(value, dotted)
         sort = "date" if dotted == "job.date" else "text"
         options, further = _options(kind, dotted), "test" if dotted.startswith(_OF_TEST) else ""
-        found.append(_FIELD | {"key": dotted, "label": label, "example": example, "sort": sort, "options": options,
-                               "further": further})  # fmt: skip
+        found.append(
+            _FIELD
+            | {"key": dotted, "label": label, "example": example, "sort": sort, "options": options, "further": further}
+        )
     for dotted, label in _OF_CERTIFICATE.items():
         sort = "date" if dotted.endswith((".issued", ".date", ".due")) else "text"
         found.append(_FIELD | {"key": dotted, "label": label, "sort": sort, "further": "yes"})

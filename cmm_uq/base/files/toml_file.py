@@ -284,14 +284,20 @@ def _said_twice(error: str, text: str, where: str) -> CmmUqError | None:
         return None
     parts = own.split(".")
     wholes = {".".join(parts[:count]) for count in range(len(parts), 0, -1)}
-    others = [number for number, name in places.items() if number != int(at[1]) and name in wholes
-              and not (lines[number - 1].lstrip().startswith("[") and name != own)]  # fmt: skip
+    others = [
+        number
+        for number, name in places.items()
+        if number != int(at[1]) and name in wholes and not (lines[number - 1].lstrip().startswith("[") and name != own)
+    ]
     if not others:
         return None
     name, other = places[others[0]], others[0]
     fix = f"Keep one of both: write all keys of [{name}] below its heading, or all of them in the line of its key"
-    return CmmUqError(f"states {name} twice: in line {other} and in line {at[1]}", where=f"{where} line {at[1]}",
-                      fix=fix if "{" in lines[other - 1] + lines[int(at[1]) - 1] else "Keep one of them")  # fmt: skip
+    return CmmUqError(
+        f"states {name} twice: in line {other} and in line {at[1]}",
+        where=f"{where} line {at[1]}",
+        fix=fix if "{" in lines[other - 1] + lines[int(at[1]) - 1] else "Keep one of them",
+    )
 
 
 def line_of(keys: list[str], text: str) -> int | None:

@@ -143,8 +143,11 @@ def _same_place(names: Sequence[str], places: Mapping[str, str]) -> tuple[Fact, 
     at: dict[tuple[float, ...], list[str]] = {}
     for name in names:
         at.setdefault(tuple(np.round(np.concatenate(place_of(places[name])), 6).tolist()), []).append(name)
-    told = [say("{names} ({place})", names=commas(map(Verbatim, own)), place=Verbatim(places[own[0]]))
-            for own in at.values() if len(own) > 1]  # fmt: skip
+    told = [
+        say("{names} ({place})", names=commas(map(Verbatim, own)), place=Verbatim(places[own[0]]))
+        for own in at.values()
+        if len(own) > 1
+    ]
     return (Fact(SAME_PLACE, say("Lines at the very same place"), semicolons(told)),) if told else ()
 
 

@@ -99,8 +99,14 @@ def taken_for(name: str, adoption: Adoption) -> tuple[Text, ...]:
     """What a certificate says of a national name."""
     if adoption.source is None:
         return ()
-    return (say("{name} is taken for the adoption of {standard}: {source}.", name=Verbatim(name),
-                standard=Verbatim(adoption.name), source=adoption.source),)  # fmt: skip
+    return (
+        say(
+            "{name} is taken for the adoption of {standard}: {source}.",
+            name=Verbatim(name),
+            standard=Verbatim(adoption.name),
+            source=adoption.source,
+        ),
+    )
 
 
 def nearest(name: str, known: Collection[str]) -> str:

@@ -155,3 +155,14 @@ def test_a_tip_of_which_not_every_coordinate_is_recorded_is_where_the_others_say
 def test_lengths_up_to_a_millimetre_apart_are_one_nominal_length() -> None:
     lengths = np.array([22.004, 20.0, 21.0, 100.0, 20.0])
     assert nominals(lengths).tolist() == [1, 0, 0, 2, 0]
+
+
+def test_a_line_that_crosses_too_little_for_a_diagonal_is_named_with_what_it_crosses() -> None:
+    """Travel 900 × 550 mm in X and Y: 45° in XY crosses all 550 mm of Y and as much of X, 61 % of it."""
+    plan = replace(PLAN, positions=("face diagonal +X +Y",))
+    oblique = (X + Y) / np.sqrt(2.0)
+    _, missing = said(along((oblique, [25.0, 400.0])), plan)
+    assert missing[0].startswith("face diagonal +X +Y (measurement 1 lies along it, but its line crosses ")
+    assert "% of the travel of X, less than 75 %)" in missing[0]
+    _, missing = said(along((X, [25.0, 400.0])), plan)
+    assert missing[0] == "face diagonal +X +Y"

@@ -18,7 +18,8 @@ from cmm_uq.base.messages import Verbatim
 from cmm_uq.jobs.verdicts import Verdict, Verdicts
 
 READ: dict[str, Any] = {
-    "problem": ["x", "cannot say", "points_per_measurement = N"], "lines": [], "example": "", "amounts": "",
+    "problem": ["x", "cannot say", "points_per_measurement = N"], "lines": [], "example": "", "amounts": "", "stated": [],
+    "doubtful": [],
     "sheets": ["a", "b"],
     "columns": [["X", "x_mm"], ["", "unknown"], ["n", "name"], ["t", "of another package"]], "more": 5, "command": "",
     "rows": [[1, ["X", "", "n", "t"], True], [2, ["1", "2", "<b>", "4"], False]], "facts": [["<b>", "b"]],
@@ -47,9 +48,9 @@ def certificate(stated: Verdicts = STATED, warnings: tuple[str, ...] = ("not sta
 
 @pytest.mark.parametrize(("shown", "told"), [
     (read(), "say below how many rows in turn"),
-    (read(problem=None, lines=[("1", "", ""), ("X", "", "x")]), "Where line X lies"),
-    (read(lines=[("1", "", "")]), '<option value="plan.csv"'),
-    (read(lines=[("2", "along X from ?,8,4", "")]), 'value="along X from ?,8,4"'),
+    (read(problem=None, lines=[("1", "", "", ""), ("X", "", "x", "")]), "Where line X lies"),
+    (read(lines=[("1", "", "", "")]), '<option value="plan.csv"'),
+    (read(lines=[("2", "along X from ?,8,4", "", "")]), 'value="along X from ?,8,4"'),
     (read(columns=[], rows=[], facts=[]), "Delete this export"),
     (run(), "Cancel"), (run(cancelled=True), "nothing was written"), (run(problem=("f", "is wrong", "")), "is wrong"),
     (certificate(), "U = 0.3 µm"), (certificate(Verdicts(), ()), "It states no conformity"),

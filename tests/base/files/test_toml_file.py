@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 import tomllib
+from pathlib import Path
 
 import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import DEPTH, NUMERAL, TEXT, TOML_KEY, WORD
-from cmm_uq.base.files.toml_file import toml_of
+from cmm_uq.base.files.toml_file import checked, toml_of
+from cmm_uq.jobs.job import JobFacts
 
 
 @given(st.text("ab=\"'[]{}.,#\\\n 1_", max_size=60))
@@ -81,3 +83,22 @@ def test_time_grows_no_faster_than_the_text(unit: str) -> None:
     with pytest.raises((tomllib.TOMLDecodeError, CmmUqError)):
         toml_of(unit * (300_000 // len(unit)) + "\n =", "t.toml")
     assert time.monotonic() - start < 30
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('[artefact]\nkind = "x"\ncertificate = { file = "a" }\n\n[artefact.certificate]\nnumber = "1"\n',
+         "job.toml line 5: states artefact.certificate twice: in line 3 and in line 5. Keep one of both: write all keys of "
+         "[artefact.certificate] below its heading, or all of them in the line of its key"),
+        ('[artefact.certificate]\nnumber = "1"\n[artefact]\ncertificate = { a = 1 }\n',
+         "job.toml line 4: states artefact.certificate twice: in line 1 and in line 4. Keep one of both"),
+        ("[job]\nid = 1\nid = 2\n", "job.toml line 3: states job.id twice: in line 2 and in line 3. Keep one of them"),
+        ("[job]\nid = 1\n[job]\nname = 2\n", "job.toml line 3: states job twice: in line 1 and in line 3"),
+        ("[job\n", "job.toml: is not valid TOML: "),
+    ],
+)  # fmt: skip
+def test_what_is_stated_twice_is_told_with_both_lines(text: str, said: str) -> None:
+    with pytest.raises(CmmUqError) as refused:
+        checked(text.encode(), Path("job.toml"), JobFacts)
+    assert str(refused.value).startswith(said)

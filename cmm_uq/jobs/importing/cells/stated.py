@@ -31,11 +31,10 @@ _DATES = (
 )
 _ODD_DATE = re.compile(r"(?<!\d)\d{1,2}[-/.]\d{1,2}[-/.]\d\d(?!\d)")
 _MONTHS = (
-    "jan led sty oca gen ene", "feb fev uno lut sub", "mar mrt maa bre mae", "apr avr dub kwi nis abr",
-    "may mai maj mei mag kve", "jun jui giu cer cze haz",
-    "jul lug cve lip tem", "aug aou ago srp sie", "sep set zar wrz eyl", "oct okt out ott rij paz",
-    "nov lis kas", "dec dez dic pro gru ara",
-)  # fmt: skip
+    *("jan led sty oca gen ene", "feb fev uno lut sub", "mar mrt maa bre mae", "apr avr dub kwi nis abr"),
+    *("may mai maj mei mag kve", "jun jui giu cer cze haz", "jul lug cve lip tem", "aug aou ago srp sie"),
+    *("sep set zar wrz eyl", "oct okt out ott rij paz", "nov lis kas", "dec dez dic pro gru ara"),
+)
 _DAY = re.compile(
     r"(?<![^\W_])(?:date|datum|data|fecha|dato|tarih|dne|pvm|paivays|paivamaara|дата|day|tag|startinspectiontime|k0004)(?![^\W_])"
     r"|日付|日期|年月日|[測检検测]\w?日|(?:측정|점검|검사|교정)일|날짜|일자|\bgemessen am\b"
@@ -76,8 +75,14 @@ _LIMIT = re.compile(
     r"(?<![\d.,])\d{1,2}(?:[.,]\d{1,3})?\s?\+\s?(?:\d{1,2}(?:[.,]\d{1,3})?\s?[*·×]?\s?)?L\s?/\s?\d{2,4}(?![.,\d])"
 )
 AIR, ARTEFACT = "recording.constant.temp_air_c", "recording.constant.temp_artefact_c"
-_LABELS = {"job.date": "date of the measurement", AIR: "temperature of the air", ARTEFACT: "temperature of the artefact",
-           "machine.name": "machine", "machine.serial": "serial number of the machine", "conformity.mpe": "limit"}  # fmt: skip
+_LABELS = {
+    "job.date": "date of the measurement",
+    AIR: "temperature of the air",
+    ARTEFACT: "temperature of the artefact",
+    "machine.name": "machine",
+    "machine.serial": "serial number of the machine",
+    "conformity.mpe": "limit",
+}
 
 
 @dataclass(frozen=True)
@@ -187,8 +192,7 @@ def _days(lines: Sequence[Line]) -> Iterator[Offer]:
     texts = [value for *_, value in (*called, *others)]
     for number, label, value in called or others:
         day = _day_of(value, texts, label) if called else None
-        words = label if value in label or not label else f"{label} {value}"
-        yield Offer("job.date", day.isoformat() if day else "", _short(words or value), number)
+        yield Offer("job.date", day.isoformat() if day else "", _words(label, value), number)
         if not called:
             return
 
@@ -228,7 +232,7 @@ def _day_of(text: str, every: Sequence[str], label: str) -> dt.date | None:
 
 
 def _warmths(lines: Sequence[Line]) -> Iterator[Offer]:
-    for number, text, cells in lines:
+    for number, _, cells in lines:
         for label, value in _valued(cells, _WARMTH):
             whole = _folded(f"{label} {value}")
             figures = [float(one.replace(",", ".")) for one in _FIGURE.findall(value.replace("−", "-"))]
@@ -240,8 +244,7 @@ def _warmths(lines: Sequence[Line]) -> Iterator[Offer]:
             of = _folded(label)
             key = ARTEFACT if _OF_ARTEFACT.search(of) else "" if _OF_SCALE.search(of) else AIR
             if fit and key:
-                words = label if value in label else f"{label} {value}"
-                yield Offer(key, f"{fit[0]:g}" if len(fit) == 1 else "", _short(words or text), number)
+                yield Offer(key, f"{fit[0]:g}" if len(fit) == 1 else "", _words(label, value), number)
 
 
 def _machines(lines: Sequence[Line]) -> Iterator[Offer]:
@@ -274,6 +277,11 @@ def _limits(lines: Sequence[Line]) -> Iterator[Offer]:
         plain = unicodedata.normalize("NFKC", text)
         if (found := _LIMIT.search(plain)) and not re.search(r"(?i)\bu\b|uncert|unsich|k\s?=\s?2", plain):
             yield Offer("conformity.mpe", found[0].replace(" ", "").replace("+", " + "), _short(text), number)
+
+
+def _words(label: str, value: str) -> str:
+    """A label with its value, which may stand in it."""
+    return _short(label if label and _folded(value) in _folded(label) else f"{label} {value}")
 
 
 def _short(text: str) -> str:
