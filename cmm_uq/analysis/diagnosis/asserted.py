@@ -14,7 +14,7 @@ end it, and it is no reason to doubt what is found.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations as subsets
 
 import numpy as np
@@ -29,10 +29,10 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import (
 )
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
-from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, Explanation, Member, effect_of
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member, effect_of
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm, families_of
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm
 from cmm_uq.analysis.diagnosis.empirical.model import ODDS
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -109,13 +109,31 @@ def _instead(
     candidates = _like(forms[:, seen], lengths[seen], shown / size, size, variance, largest, spare)
     tried = sorted(candidates, key=lambda one: one[0])[:_TRIED]
     names = [tuple(others[seen[k]] for k in each) for _, each, _ in tried]
-    evidence = _evidence(comparison, given, [taken, *names])
+    fitted = [one for one in _fitted(comparison.left, forms, lengths, others, always) if one[0] not in names]
+    evidence = _evidence(comparison, given, [taken, *names, *(members for members, _ in fitted)])
+    less_than = (evidence[0] - evidence[1:]).tolist()
     found: list[tuple[tuple[int, ...], tuple[float, ...], float, float]] = []
-    for (less, _, sizes), members, log in zip(tried, names, evidence[1:], strict=True):
+    for (less, _, sizes), members, log_odds in zip(tried, names, less_than, strict=False):
         lost = max(less - 0.5 * max(spare - len(members), 0), 0.0)  # without what so many more fit of noise alone
-        if evidence[0] - log <= np.log(ODDS) or always >= set(members):
+        if log_odds <= np.log(ODDS) or always >= set(members):
             found.append((members, tuple(sizes.tolist()), lost, 2 * less * variance / size**2))
+    for (members, sizes), log_odds in zip(fitted, less_than[len(names) :], strict=True):
+        if log_odds <= np.log(ODDS):
+            found.append((members, tuple(sizes.tolist()), max(log_odds, 0.0), 1.0))
     return [one for one in found if not any(set(fewer[0]) < set(one[0]) for fewer in found)]
+
+
+def _fitted(
+    left: Floats, forms: Floats, lengths: Floats, others: Sequence[int], always: Key
+) -> Iterator[tuple[tuple[int, ...], Floats]]:
+    """Sets of what every machine has, and its sizes, prior sd's: they may fit all readings as well, in another form."""
+    free = [k for k, i in enumerate(others) if i in always and lengths[k] > 0]
+    for each in (one for count in range(1, _MOST + 1) for one in subsets(free, count)):
+        own = forms[:, each]
+        if np.linalg.det(own.T @ own) > _DISTINCT:
+            sizes = np.linalg.lstsq(own, left, rcond=None)[0] / lengths[list(each)]
+            if np.all(np.abs(sizes) < _ALLOWED):
+                yield tuple(others[k] for k in each), sizes
 
 
 def _single(explanation: Explanation) -> bool:
@@ -180,6 +198,7 @@ def _evidence(comparison: CandidateComparison, given: Sequence[Version], sets: S
 
 NAMED = 0.8  # probability from which an effect is named, alone or as one of a group
 IMPROBABLE = say("it is too improbable to be named, alone or together with what the readings do not tell from it")
+UNSEEN = say("others of its kind make it probable, and the readings alone do not speak for it by 20 to 1")
 _TOLD_APART = 0.95
 # Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1
 _ODDS = 0.05
@@ -222,7 +241,7 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
             1 / one.odds for one in stand_ins if len(one.effects) != len(one.instead_of) or {*one.effects} <= rigid
         ]
         by_readings = min(probability, together / (1 + sum(fewer))) if fewer else probability
-        group = group if probability < NAMED or by_readings == probability else ()
+        group = group if probability < NAMED else ()
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
         if modes and known:  # what is reported of a period is reported of one
@@ -255,9 +274,18 @@ def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[floa
         return 0.0, 0.0, ()
     group = jointly.group_of(combinations, result.chosen, index)
     group |= frozenset() if known else combinations.imitating(index)
+    group = _as_well(result, index, group)
     ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
     names = tuple(combinations.explanations[i].name for i in ordered)
     return combinations.of(index), combinations.of_any(group | {index}), names
+
+
+def _as_well(result: SearchResult, index: int, others: Iterable[int]) -> Key:
+    """Of others, functions and the effects in whose favour the readings alone speak within 20 : 1 of one, all else kept."""
+    comparison, given = result.first.comparison, [v for v in result.versions if v.explanation != index]
+    least = comparison.beside(given, (index,))[index][0] - np.log(ODDS)
+    every = result.first.explanations
+    return frozenset(i for i in others if every[i].kind == UNKNOWN or comparison.beside(given, (i,))[i][0] >= least)
 
 
 def _squares(linear: LinearModel, without: Sequence[int]) -> float:
@@ -271,7 +299,8 @@ def indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
     names, groups = [e.name for e in result.first.explanations], []
     for i in sorted(result.chosen):
         odds = result.combinations.instead(result.chosen, i)
-        rivals = sorted((r for r in odds if odds[r] > _ODDS), key=lambda r: -odds[r])
+        alike = _as_well(result, i, (r for r in odds if odds[r] > _ODDS))
+        rivals = sorted(alike, key=lambda r: -odds[r])
         if rivals and result.combinations.of(i) < _TOLD_APART:
             groups.append((names[i], *(names[r] for r in rivals)))
     return tuple(groups)
@@ -283,7 +312,7 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
     for i in result.chosen if result.combinations is not None else ():
         if _probability(result, i, known=_known(result, i))[1] < NAMED:
             gone[i] = withheld_effect(result, i, IMPROBABLE)
-    data = FunctionFit.of(result, families_of(result)) if result.chosen and not gone else None
+    data = FunctionFit.of(result, result.first.families) if result.chosen and not gone else None
     if data is None or not data.families or not data.degrees:
         return gone, False
     beside = _likeliest(data) if data.total - data.nothing > np.log(ODDS) else None
@@ -301,6 +330,23 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
             why = say("the readings show another form: {function}", function=other.title)
             gone[i] = withheld_effect(result, i, why)
     return gone, beside is not None
+
+
+def unseen(result: SearchResult) -> dict[int, WithheldEffect]:
+    """The scale or squareness that the readings alone speak for least, where they do not by 20 : 1.
+
+    Those of a machine out of adjustment make each other probable, and none of them is ever exactly zero: that is no evidence.
+    """
+    comparison, weakest, least = result.first.comparison, -1, float(np.log(ODDS))
+    for i in (i for i in sorted(result.chosen) if result.first.explanations[i].together):
+        given = [v for v in result.versions if v.explanation != i]
+        own = comparison.beside(given, (i,))[i][0] - float(comparison.log_evidence_of(given)[0])
+        if own < least:
+            weakest, least = i, own
+    if weakest < 0:
+        return {}
+    alone = float(scipy.special.expit(least))
+    return {weakest: replace(withheld_effect(result, weakest, UNSEEN), probability=alone)}
 
 
 def _known(result: SearchResult, index: int) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
-from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, doubted, indistinguishable, left_out
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, doubted, indistinguishable, left_out, unseen
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
@@ -262,6 +262,9 @@ def _asserted(
     places: dict[int, WithheldEffect] = {}  # of each effect that was tried in the place of others, the first of these
     tried: frozenset[int] = frozenset()
     while True:
+        while weak := unseen(result):  # what it stands for is within the noise: nothing more is unexplained without it
+            result = replace(withhold(result, frozenset(weak)), unexplained=result.unexplained)
+            gone = (*gone, *weak.values())
         doubtful, beside = doubted(result)
         while doubtful:
             result, gone = withhold(result, frozenset(doubtful)), (*gone, *doubtful.values())

@@ -96,7 +96,7 @@ def test_effects_that_a_function_could_not_be_are_not_named_with_it() -> None:
 
 def found_with(*members: tuple[tuple[int, ...], float], chosen: frozenset[int]) -> SearchResult:
     of = combinations(*members)
-    first = SimpleNamespace(explanations=of.explanations)
+    first = SimpleNamespace(explanations=of.explanations, families=[])
     none: Any = None
     return SearchResult(cast("ModelComparison", first), none, of, chosen, (), none, 0.0)
 
@@ -134,6 +134,7 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
         "effects_without_size": open_size,
         "joint_posterior": lambda *_: None,
         "doubted": lambda _found: ({}, False),
+        "unseen": lambda _found: {},
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
     }.items():
         monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
@@ -159,6 +160,7 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
         "effects_without_size": open_size,
         "joint_posterior": lambda *_: None,
         "doubted": lambda _found: ({}, False),
+        "unseen": lambda _found: {},
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
         "substitute": lambda *_: None,
     }.items():

@@ -7,12 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.asserted import NAMED, doubted
-from cmm_uq.analysis.diagnosis.comparison.search import search
+from cmm_uq.analysis.diagnosis.asserted import NAMED, doubted, unseen
+from cmm_uq.analysis.diagnosis.comparison.search import search, withhold
 from cmm_uq.analysis.diagnosis.diagnosis import diagnose
+from cmm_uq.analysis.diagnosis.joint import WithheldEffect
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.diagnosis.test_assertion import found_with
 from tests.analysis.diagnosis.test_invariance import NAMED as SIX
@@ -42,7 +43,7 @@ def test_an_effect_is_named_from_four_in_five_with_what_could_stand_in_its_place
     part = 0.6 * probability
     start = found_with(((0,), part), ((1,), probability - part), ((), 1 - probability), chosen=frozenset({0}))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("cmm_uq.analysis.diagnosis.asserted.families_of", lambda _found: [])
+        patched.setattr("cmm_uq.analysis.diagnosis.asserted._as_well", lambda _found, _one, others: frozenset(others))
         patched.setattr("cmm_uq.analysis.diagnosis.asserted.FunctionFit.of", lambda *_: None)
         patched.setattr("cmm_uq.analysis.diagnosis.joint.effect_of", lambda _one: effects(("play_x_y",))[0])
         gone, beside = doubted(start)
@@ -83,3 +84,23 @@ def test_what_is_withheld_so_is_modelled_as_a_function() -> None:
     assert found.verdict == "empirical"
     assert "play_x_y" in [each.effect for each in found.withheld]
     assert found.improvement.heldout_rms_after_um <= found.improvement.heldout_rms_before_um
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_errors_that_only_others_of_their_kind_make_probable_are_not_named(seed: int) -> None:
+    """Two squarenesses as 1 : 2 of a machine of which the job says nothing: four of the six are none."""
+    random = np.random.default_rng(seed)
+    points = bars(random, 40, 400.0, Machine("m", "XYZ", TRAVEL))
+    truth = RecordingModel(Ballbar(bar_facts(), points), effects(("squareness_yz", "squareness_zx")))
+    read = points.at(truth.simulate(np.array([10.0, 20.0]), np.array([400.0]), Noise(1.5e-3), random))
+    found = search(RecordingModel(Ballbar(bar_facts(), read), ()), None, alpha=0.01, seed=1)
+    probable, gone = found.combinations, dict[int, WithheldEffect]()
+    assert probable is not None
+    while weak := unseen(found):
+        gone |= weak
+        found = withhold(found, frozenset(weak))
+    assert set(found.effects) == {"squareness_yz", "squareness_zx"}
+    for i, one in gone.items():
+        assert one.probability <= 20 / 21 < 1
+        assert one.probability < probable.of(i)
+        assert "20 to 1" in str(one.why)

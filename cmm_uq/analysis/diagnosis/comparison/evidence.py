@@ -142,6 +142,10 @@ class CandidateComparison:
     def _integral(self) -> SigmaIntegral:
         return SigmaIntegral(self.sigma, self.log_sigma, self.degrees_of_freedom, float(self.left @ self.left))
 
+    def integrated(self, squares: Floats) -> Floats:
+        """Log evidence of sums of squares under one kind of noise, mm², which are overwritten, its size integrated out."""
+        return self._integral(squares)
+
     def of_nothing(self, data: Floats) -> Floats:
         """Log evidence (k, b) of nothing beyond the baseline, by kind of noise, for data (m, b)."""
         known = self._weigh(data, ())

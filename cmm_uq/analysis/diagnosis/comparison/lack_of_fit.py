@@ -141,7 +141,7 @@ def under_heavy_tails(normal: CandidateComparison, data: Floats) -> Iterator[tup
 SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
 NOTHING = 1 - sum(SHARES.values())
 DRAWS = 200
-_TAIL = 0.8
+TAIL = 0.8
 # Factor from the false-alarm rate within which a probability is found more closely: 200 draws know one of 0.01 to a factor
 # of three, and heavy tails that are reckoned with make it as much smaller
 _NEAR = 10.0
@@ -176,18 +176,22 @@ def lack_of_fit(comparison: CandidateComparison, seed: int, alpha: float | None 
 def _nearer(comparison: CandidateComparison, draws: Floats, random: np.random.Generator, alpha: float) -> float:
     """The same probability by odds that reckon with heavy tails, from as many draws as say on which side of the rate it is."""
     normal = comparison.only([k for k, kind in enumerate(comparison.kinds) if kind.name != "tails"])
-    least = float(np.quantile(statistic_of(normal, draws)[0], _TAIL))
+    least = float(np.quantile(statistic_of(normal, draws)[0], TAIL))
     value = float(robust_statistic_of(normal, comparison.left[:, None], least)[0])
     found = robust_statistic_of(normal, draws, least)
     while True:
-        share = (1 - _TAIL) * DRAWS / len(found)
+        share = (1 - TAIL) * DRAWS / len(found)
         p_value = tail_probability(found, value, 1 - share)
-        # relative standard error of an exponential tail: of the part that is in it, and of its mean
-        error = np.sqrt((1 + np.log(share / p_value) ** 2) / (share * len(found)))
-        if len(found) >= _MOST or abs(np.log(p_value / alpha)) > _CLEAR * error:
+        if len(found) >= _MOST or is_clear(p_value, alpha, share * len(found), share):
             return p_value
         more = draw_nothing(comparison, random, DRAWS)
         found = np.append(found, robust_statistic_of(normal, more, least))
+
+
+def is_clear(p_value: float, alpha: float, draws: float, tail: float = 1 - TAIL) -> bool:
+    """Whether a probability from an exponential tail, with so many draws in it, is on one side of a rate."""
+    error = np.sqrt((1 + np.log(tail / p_value) ** 2) / draws)  # relative: of the part that is in it, and of its mean
+    return bool(abs(np.log(p_value / alpha)) > _CLEAR * error)
 
 
 def statistic_of(
@@ -294,7 +298,7 @@ def _together(versions: Sequence[Version]) -> dict[Version, list[int]]:
     return found
 
 
-def tail_probability(draws: Floats, value: float, tail: float = _TAIL) -> float:
+def tail_probability(draws: Floats, value: float, tail: float = TAIL) -> float:
     """Probability of reaching a value of log odds, from draws; beyond a quantile of theirs with an exponential tail.
 
     Log odds have a floor. Where draws crowd at it they show no tail, and beyond the largest draw they show none in any case:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -13,6 +14,8 @@ from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
+from cmm_uq.analysis.diagnosis.comparison.lack_of_form import lack_of_form
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, families_of
 from cmm_uq.analysis.diagnosis.noise import noise_kinds, sigma_grid
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -22,6 +25,7 @@ from cmm_uq.machine.model.measurement import SMALL_LEAN
 from cmm_uq.machine.model.noise import display_of
 
 _MISFIT = 20.0  # largest misfit, over the noise, that is reckoned with when the noise is not stated
+_OF_FORMS = 0.2  # part of the false-alarm rate at which forms speak where effects and smooth functions do not
 ASSERTED = 0.5  # probability from which an effect, or one of those that cannot be told from it, is asserted
 # Probability from which an effect is asserted when all that is asked is whether it has its own form or any other
 _MECHANISM = 0.2
@@ -51,6 +55,11 @@ class ModelComparison:
     @property
     def explanations(self) -> Sequence[Explanation]:
         return self.comparison.explanations
+
+    @cached_property
+    def families(self) -> list[FunctionFamily]:
+        """All functions of what is recorded that the misfit could be."""
+        return families_of(self.model, self.values, self.comparison)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +100,9 @@ def search(model: RecordingModel, stated: float | None, *, alpha: float, seed: i
 
 def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int) -> SearchResult:
     first = model_comparison(model, stated, seed, alpha)
+    if first.p_value >= alpha:  # what no effect is, and no smooth function, may have a form
+        of_forms = lack_of_form(first.comparison, first.families, seed, _OF_FORMS * alpha) / _OF_FORMS
+        first = replace(first, p_value=of_forms) if of_forms < alpha else first
     if first.p_value >= alpha:
         return SearchResult(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
     combinations = explore(first.comparison)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.comparison.algebra import SigmaIntegral, eigen
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES
+from cmm_uq.analysis.diagnosis.comparison.lack_of_form import likeliest_noise
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, Improvement, held_out_groups
@@ -48,9 +49,12 @@ class FunctionFit:
 
     @classmethod
     def of(cls, result: SearchResult, families: Sequence[FunctionFamily]) -> FunctionFit:
-        """Under the noise that is most probable beside what was found."""
+        """Under the noise that is most probable beside what was found; of nothing known, beside any of the functions."""
         comparison = result.first.comparison
-        kind = comparison.kinds[int(comparison.noise_probability(result.versions).argmax())]
+        likeliest = int(comparison.noise_probability(result.versions).argmax())
+        if not result.chosen and families and comparison.degrees_of_freedom:
+            likeliest = likeliest_noise(comparison, families)
+        kind = comparison.kinds[likeliest]
         root = kind.coloured(np.eye(len(comparison.observed)))
         covariance = root @ root.T
         for columns in (kind.slow, comparison.certified):

@@ -12,12 +12,13 @@ from itertools import product
 
 import numpy as np
 
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, mean_of, smooth_functions
-from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Ints, reading_name
 from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.columns import in_words
+from cmm_uq.machine.model import RecordingModel
 
 SMOOTH, ROUGH = "smooth", "rough"  # of no form in particular, with a slope everywhere and without
 PRODUCT, BOWL = "product", "bowl"  # forms of two readings
@@ -199,9 +200,10 @@ class FunctionFamily:
         return replace(_of_form(self.term, divided, seen, self.covariate, log_prior), seen=None, cell=cell)
 
 
-def families_of(result: SearchResult) -> list[FunctionFamily]:
-    """All functions of a recording, each term as probable as another."""
-    found = [*_of_points(result), *_of_approach(result), *_of_observations(result)]
+def families_of(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> list[FunctionFamily]:
+    """All functions of a recording, each term as probable as another; about values (k,) of the model's unknowns."""
+    each = (_of_points, _of_approach, _of_observations)
+    found = [family for of in each for family in of(model, values, comparison)]
     terms = len({family.term for family in found})
     seen = (family for family in found if np.linalg.norm(family.columns, axis=(0, 2)).max() > _SEEN)
     return [replace(family, log_prior=family.log_prior - float(np.log(terms))) for family in seen]
@@ -237,9 +239,8 @@ def _rough_functions(covariate: Floats) -> Iterator[Floats]:
         yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
 
 
-def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
-    model, values, scale = result.first.model, result.first.values, result.first.comparison.noise_scale
-    points = model.artefact.points.at(model.where(values))
+def _of_points(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
+    scale, points = comparison.noise_scale, model.artefact.points.at(model.where(values))
     readings = {axis: read for axis, read in points.readings.items() if np.ptp(read) > 1.0}
     middle = {axis: 0.5 * (read.min() + read.max()) for axis, read in readings.items()}
     arms = {axis: (read - middle[axis]) / (0.5 * np.ptp(read)) for axis, read in readings.items()}
@@ -279,10 +280,9 @@ def _of_points(result: SearchResult) -> Iterator[FunctionFamily]:
             yield from _families(term, moving(along, readings[along] / half), column)
 
 
-def _of_approach(result: SearchResult) -> Iterator[FunctionFamily]:
+def _of_approach(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
     """Of a direction of travel, by as much everywhere and in proportion to a reading."""
-    model, values, scale = result.first.model, result.first.values, result.first.comparison.noise_scale
-    points = model.artefact.points.at(model.where(values))
+    scale, points = comparison.noise_scale, model.artefact.points.at(model.where(values))
     for along, key in product(range(3), (f"approach_{a}" for a in AXES if f"approach_{a}" in points.columns)):
         for axis, read in ((axis, read) for axis, read in points.readings.items() if np.ptp(read) > 1.0):
             arm = (read - 0.5 * (read.min() + read.max())) / (0.5 * np.ptp(read))
@@ -294,14 +294,16 @@ def _of_approach(result: SearchResult) -> Iterator[FunctionFamily]:
             yield FunctionFamily(of, PRODUCT, columns, 0.0, np.zeros(0), np.zeros((0, 1, 2)), formula=formula)
 
 
-def _of_observations(result: SearchResult) -> Iterator[FunctionFamily]:
-    model, scale = result.first.model, result.first.comparison.noise_scale
+def _of_observations(
+    model: RecordingModel, values: Floats, comparison: CandidateComparison
+) -> Iterator[FunctionFamily]:
+    scale = comparison.noise_scale
     for key, column in model.artefact.points.own_columns.items():
         mean = mean_of(model, column)
         if len(np.unique(mean)) > 2:
             title = say("error as a function of {name}", name=in_words(key))
             yield from _families(FunctionTerm(key, title), lambda f: f / scale[:, None], mean)
-    for one in (e for e in result.first.explanations if e.kind == UNKNOWN and e.covariate is None):
+    for one in (e for e in comparison.explanations if e.kind == UNKNOWN and e.covariate is None):
         for member in one.members:
             columns = (member.columns / scale[:, None])[:, None]
             log = -float(np.log(len(one.members)))

@@ -19,7 +19,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, U
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical import evidence
-from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, FunctionTerm, families_of
+from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, FunctionTerm
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
@@ -82,7 +82,7 @@ class BestKnown:
 
 def empirical_model(result: SearchResult) -> EmpiricalModel | None:
     """What functions of what is recorded make of the misfit; nothing where none has odds of 20 : 1."""
-    data = evidence.FunctionFit.of(result, families_of(result))
+    data = evidence.FunctionFit.of(result, result.first.families)
     if not data.families or not data.degrees:
         return None
     beside, described = data.refined(), list[EmpiricalFunction]()

@@ -1,0 +1,109 @@
+"""Whether anything is missing that has the form of no effect and of no smooth function: all of a dictionary's at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.diagnosis.comparison.algebra import Precision, eigen, log_sum, log_sum_in
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import TAIL, draw_nothing, is_clear, tail_probability
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily
+from cmm_uq.base.points import Floats
+
+_SIZES = np.geomspace(0.4, 12.0, 5)  # rms of a function of many coefficients over the noise, as tried
+_FITTED = 2  # coefficients up to which a function takes what fits best
+_SHOWS = 0.4  # rms over the noise that the largest must reach
+_UNABSORBED = 1e-5  # part of its length that the baseline leaves
+_BEGIN, _OPEN, _FURTHER = 100, 0.1, 400  # draws; probability from which on they are enough; draws more
+_NUMBERS = 400_000  # of a block of columns
+
+
+def lack_of_form(comparison: CandidateComparison, families: Sequence[FunctionFamily], seed: int, alpha: float) -> float:
+    """Probability, under nothing, of as much evidence for a function of closed form, or a rough one.
+
+    Noise is of any kind but heavy tails; what is drawn has these too.
+    """
+    if not families or comparison.degrees_of_freedom < 2:
+        return 1.0
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(19,)))
+    normal = comparison.only([k for k, kind in enumerate(comparison.kinds) if kind.name != "tails"])
+    data = np.column_stack([comparison.left, draw_nothing(comparison, random, _BEGIN)])
+    value, *draws = _log_odds(normal, families, data).tolist()
+    p_value = tail_probability(np.array(draws), value)
+    if p_value < _OPEN and not is_clear(p_value, alpha, (1 - TAIL) * _BEGIN):
+        draws += _log_odds(normal, families, draw_nothing(comparison, random, _FURTHER)).tolist()
+        p_value = tail_probability(np.array(draws), value)
+    return p_value
+
+
+def likeliest_noise(comparison: CandidateComparison, families: Sequence[FunctionFamily]) -> int:
+    """Kind of noise that is most probable of the recording beside a function, whichever it is; heavy tails are none."""
+    normal = [k for k, kind in enumerate(comparison.kinds) if kind.name != "tails"]
+    own, left = comparison.only(normal), comparison.left[:, None]
+    return normal[int(np.logaddexp(_of_forms(own, families, left), own.of_nothing(left)).argmax())]
+
+
+def _log_odds(comparison: CandidateComparison, families: Sequence[FunctionFamily], data: Floats) -> Floats:
+    """Log odds (b,) of any function over nothing for data (m, b)."""
+    return np.asarray(
+        np.logaddexp.reduce(_of_forms(comparison, families, data)) - log_sum(comparison.of_nothing(data), 0)
+    )
+
+
+def _of_forms(comparison: CandidateComparison, families: Sequence[FunctionFamily], data: Floats) -> Floats:
+    """Log evidence (k, b) of functions, by kind of noise, for data (m, b), the size of few coefficients at its likeliest."""
+    degrees, found = comparison.degrees_of_freedom, np.full((len(comparison.kinds), data.shape[1]), -np.inf)
+    totals = [np.einsum("mb,mb->b", data, noise(data)) for noise in comparison.precisions]
+    for columns, log_prior in _blocks(families):
+        for k, (noise, square, total) in enumerate(zip(comparison.precisions, comparison.squares, totals, strict=True)):
+            weighed, strengths, seen = _along_axes(noise, columns, _SHOWS**2 * float(square))
+            if strengths.shape[1] <= _FITTED:
+                gain = 1 / strengths[:, None]
+                constant = np.full((len(strengths), 1), -0.5 * strengths.shape[1] * np.log(degrees))
+            else:
+                part = strengths / strengths.sum(axis=1, keepdims=True)
+                ratio = (_SIZES**2 * degrees)[:, None] * part[:, None]
+                gain = ratio / (1 + ratio) / strengths[:, None]
+                constant = -0.5 * np.log1p(ratio).sum(axis=2) - np.log(len(_SIZES))
+            constant += noise.log + log_prior[seen, None]
+            if len(strengths):
+                log = comparison.integrated(total - gain @ (weighed @ data) ** 2) + constant[:, :, None]
+                found[k] = np.logaddexp(found[k], log_sum_in(log.reshape(-1, data.shape[1]), 0))
+    return found
+
+
+def _blocks(families: Sequence[FunctionFamily]) -> Iterator[tuple[Floats, Floats]]:
+    """Functions (m, K, r) of as many coefficients, and the log prior of each (K,), so many at once as a block may hold."""
+    for r in sorted({family.columns.shape[2] for family in families}):
+        some, size = list[FunctionFamily](), 0
+        for family in [each for each in families if each.columns.shape[2] == r]:
+            if some and size + family.columns.size > _NUMBERS:
+                yield _joined(some)
+                some, size = [], 0
+            some.append(family)
+            size += family.columns.size
+        yield _joined(some)
+
+
+def _joined(some: Sequence[FunctionFamily]) -> tuple[Floats, Floats]:
+    log_prior = np.repeat([each.log_prior for each in some], [each.columns.shape[1] for each in some])
+    return np.concatenate([each.columns for each in some], axis=1), log_prior
+
+
+def _along_axes(noise: Precision, columns: Floats, least: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Of functions (m, K, r) weighed rows (K', r, m) along principal axes and strengths (K', r), and which show so much."""
+    m, _, r = columns.shape
+    flat = columns.reshape(m, -1)
+    weighed = noise(flat).T.reshape(-1, r, m)
+    strengths, turn = eigen(weighed @ columns.transpose(1, 0, 2)) if r > 1 else _alone(weighed, columns)
+    most = _UNABSORBED**2 * np.sum((noise.whitening @ flat).reshape(m, -1, r) ** 2, axis=(0, 2))
+    seen = strengths.sum(axis=1) > np.maximum(least, most)
+    rows = turn[seen].swapaxes(1, 2) @ weighed[seen] if r > 1 else weighed[seen]
+    return rows, np.maximum(strengths[seen], most[seen, None]), seen
+
+
+def _alone(weighed: Floats, columns: Floats) -> tuple[Floats, Floats]:
+    return np.einsum("krm,mkr->kr", weighed, columns), np.ones((len(weighed), 1, 1))
