@@ -22,7 +22,6 @@ from cmm_uq.certificate.origin import CERTIFICATE
 from cmm_uq.certificate.wording import NO_FACTOR, expanded
 from cmm_uq.jobs.chain import TraceabilityChain, chain_of, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
-from cmm_uq.jobs.part.tables import PartFile
 from cmm_uq.jobs.recording.beside import ShortGaugeFacts
 from cmm_uq.jobs.recording.compared import OF_POINTS
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts, Traceability
@@ -35,6 +34,7 @@ from cmm_uq.maths.uncertainty.quantity import Quantity, figure, nominal, signifi
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.result import Result
+    from cmm_uq.jobs.part.tables import PartFile
 
 
 def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:

@@ -21,13 +21,13 @@ from cmm_uq.base.plugins import KINDS, STANDARDS, versions
 from cmm_uq.base.values import asdict, dataclass, replace
 from cmm_uq.certificate.document import Document, Table, table
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.machine_state import PassedFacts
 from cmm_uq.jobs.tables.identification import COMPENSATED, MEASURED, SIMULATED, Origin
 from cmm_uq.machine.physics.catalogue import plugins
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 if TYPE_CHECKING:
+    from cmm_uq.jobs.part.machine_state import PassedFacts
     from cmm_uq.laboratory.records.facts import ChainHead
 
 BANNERS = {

@@ -19,15 +19,14 @@ from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.derived_job import files_of, prediction_of
 from cmm_uq.jobs.importing.cells.encodings import begins_with
-from cmm_uq.jobs.importing.documents import DCC
-from cmm_uq.jobs.importing.format import HEAD, Recognition
-from cmm_uq.jobs.importing.recording import read_recording_file
+from cmm_uq.jobs.importing.format import DCC, HEAD, Recognition
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.machines import in_coordinates, machine_of
 from cmm_uq.jobs.recording import compared
 from cmm_uq.jobs.recording.beside import LOG, SHORT_GAUGE, ShortGauge, log_of, short_gauge_of, with_logged
 from cmm_uq.jobs.recording.compared import EXPANDED, OF_POINTS, reference_file
+from cmm_uq.jobs.recording.own import read_recording_file
 from cmm_uq.jobs.reports import as_found_of, calibration_file, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
 from cmm_uq.jobs.tables import identification

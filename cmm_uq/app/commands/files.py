@@ -21,7 +21,6 @@ from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.result import Outcome
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
 from cmm_uq.laboratory.records.facts import BEGINNING, KEY, ChainHead, Heads
 from cmm_uq.laboratory.records.opening import open_records
@@ -32,6 +31,7 @@ from cmm_uq.machine.physics.stated import physics_of, with_own_physics
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
+    from cmm_uq.jobs.part.job import PartJob
     from cmm_uq.laboratory.records.store import Records
 
 _UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")

@@ -24,11 +24,11 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.importing.answers import matching, path_of
-from cmm_uq.jobs.importing.format import Cell, ImportKeys, Recognition, Sheet, letters, sources_of
+from cmm_uq.jobs.importing.format import SAME_PLACE, Cell, ImportKeys, Recognition, Sheet, letters, sources_of
 from cmm_uq.jobs.importing.header import NAME, Header, text_of, understood
-from cmm_uq.jobs.importing.lines import SAME_PLACE
-from cmm_uq.jobs.importing.recording import example, imported, points_of, tables_in
+from cmm_uq.jobs.importing.recording import example, imported, tables_in
 from cmm_uq.jobs.importing.roles import said as role_said
+from cmm_uq.jobs.recording.own import points_of
 
 BEFORE, AFTER, WIDEST = 4, 8, 40  # rows ahead of the first figures and after it, and columns, that are shown
 IGNORED, UNKNOWN = "ignored", "unknown"

@@ -20,7 +20,7 @@ NAMESPACES: Mapping[str, str] = {  # by prefix
     "xsi": "http://www.w3.org/2001/XMLSchema-instance",
 }
 _PREFIXES = {uri: prefix for prefix, uri in NAMESPACES.items()}
-_ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # characters that no XML 1.0 can hold
+_ILLEGAL = "[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # characters that no XML 1.0 can hold
 
 
 class Node:
@@ -136,7 +136,7 @@ def _spelled(name: str, prefix: str = "o") -> tuple[str, dict[str, str]]:
 
 
 def _escaped(text: str) -> str:
-    if illegal := _ILLEGAL.search(text):
+    if illegal := re.search(_ILLEGAL, text):
         problem = f"{illegal[0]!r} is a character that XML cannot hold"
         raise CmmUqError(problem, fix="Take it out of the text it stands in")
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("\r", "&#13;")

@@ -19,7 +19,7 @@ from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.units import UNITS as PRINTED
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.encodings import begins_with, decoded, head_text, local, root_of
-from cmm_uq.jobs.importing.format import LENGTHS, UNITS, Cell, Fact, Format, ImportKeys, Row, Sheet, sheets_of
+from cmm_uq.jobs.importing.format import DCC, LENGTHS, UNITS, Cell, Fact, Format, ImportKeys, Row, Sheet, sheets_of
 from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of, without_results
 
 if TYPE_CHECKING:
@@ -131,7 +131,6 @@ def child(element: Element, name: str) -> str:
 
 
 _BY_DSI = {unit.dsi: str.__str__(unit) for unit in PRINTED.values()}
-DCC = "digitalCalibrationCertificate"  # root of a certificate
 
 
 class Dcc(Format):

@@ -159,7 +159,7 @@ class FileKeys(JobTable):
 
 
 _TRIPLE = r"\s*([-+−]?[\d.]+)\s*,\s*([-+−]?[\d.]+)\s*,\s*([-+−]?[\d.]+)\s*"
-LINE_PLACE = re.compile(rf"(?:along\s+([-+−]?)([xyz])\s+from{_TRIPLE}|from{_TRIPLE}to{_TRIPLE})", re.IGNORECASE)
+LINE_PLACE = rf"(?i:along\s+([-+−]?)([xyz])\s+from{_TRIPLE}|from{_TRIPLE}to{_TRIPLE})"
 
 
 class ImportKeys(FileKeys):
@@ -176,7 +176,7 @@ class ImportKeys(FileKeys):
     @classmethod
     def _places(cls, lines: dict[str, str]) -> dict[str, str]:
         for name, place in lines.items():
-            if not LINE_PLACE.fullmatch(place.strip()):
+            if not re.fullmatch(LINE_PLACE, place.strip()):
                 raise ValueError(f'{place!r} says no place of line {name}: write "along X from 100,200,300"')
         return lines
 
@@ -191,6 +191,8 @@ class NotReadError(CmmUqError):
 
 
 HEAD = 65_536  # bytes of a file by which it is recognised
+SAME_PLACE = "same_place"  # key of a fact: of lines whose places are one
+DCC = "digitalCalibrationCertificate"  # root of a digital one
 
 Cell = str | float
 """Text without the blanks around it, empty where there is nothing; or a number, of a format that keeps numbers."""

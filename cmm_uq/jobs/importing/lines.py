@@ -35,7 +35,17 @@ from cmm_uq.jobs.importing.factors import (
     senses,
     together,
 )
-from cmm_uq.jobs.importing.format import LINE_PLACE, UNITS, Fact, ImportKeys, NotReadError, Row, Sheet, length_named
+from cmm_uq.jobs.importing.format import (
+    LINE_PLACE,
+    SAME_PLACE,
+    UNITS,
+    Fact,
+    ImportKeys,
+    NotReadError,
+    Row,
+    Sheet,
+    length_named,
+)
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 from cmm_uq.jobs.importing.lengths.placing import place_of_axis
 from cmm_uq.jobs.importing.reports import TextReport
@@ -135,9 +145,6 @@ def _told(names: Sequence[str], places: Mapping[str, str], by_file: Stated) -> F
     return Fact("lines", say("Lines"), semicolons(told))
 
 
-SAME_PLACE = "same_place"
-
-
 def _same_place(names: Sequence[str], places: Mapping[str, str]) -> tuple[Fact, ...]:
     """Lines that begin at one place and go one way, so that whatever they differ by is no error of another place."""
     at: dict[tuple[float, ...], list[str]] = {}
@@ -153,7 +160,7 @@ def _same_place(names: Sequence[str], places: Mapping[str, str]) -> tuple[Fact, 
 
 def place_of(text: str) -> tuple[Floats, Floats]:
     """Start (3,) and direction (3,) of a line."""
-    parts = LINE_PLACE.fullmatch(text.strip())
+    parts = re.fullmatch(LINE_PLACE, text.strip())
     if parts is None:
         raise CmmUqError(f"{text!r} says no place", where="lines", fix='Write "along X from 100,200,300"')
     figures = [float(figure.replace("−", "-")) for figure in parts.groups()[2:] if figure]

@@ -1,1 +1,1 @@
-"""What is joined to a recording: certified values, temperatures, a short gauge, predictions."""
+"""How a recording is read, and what is joined to it: certified values, temperatures, a short gauge, predictions."""

@@ -23,7 +23,7 @@ from cmm_uq.base.files.table import Expansion, JobTable, Length, Limit, key, req
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.base.values import dataclass, replace
-from cmm_uq.jobs.importing.recording import read_recording
+from cmm_uq.jobs.recording.own import read_recording
 from cmm_uq.jobs.tables.artefact import Traceability
 from cmm_uq.jobs.tables.length_formula import Factor, Freedom, with_standard_uncertainty
 from cmm_uq.jobs.tables.machine import MachineFacts

@@ -30,8 +30,6 @@ from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.columns import COORDINATES, LARGEST_NUMBER, OPTIONAL, WHOLE, largest
 from cmm_uq.jobs.importing.format import Recognition
-from cmm_uq.jobs.importing.header import COVERAGE
-from cmm_uq.jobs.importing.recording import imported_references
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.length_formula import divisor_of
 from cmm_uq.jobs.tables.machine import ErrorMapFile
@@ -60,13 +58,15 @@ def with_references(
     points: Points, artefact: ArtefactFacts, inputs: Mapping[str, bytes], folder: Path, where: str
 ) -> tuple[Points, Recognition]:
     """A recording with the certified values of its points, and how their file was read."""
+    from cmm_uq.jobs.importing import header, recording  # with all that understands what others wrote
+
     chain = artefact.certificate
     if chain is None or chain.file is None:
         raise CmmUqError("the certificate names no file", where=where)
     place = str(folder / chain.file)
     if twice := [name for name in REFERENCES if name in points.columns]:
         raise CmmUqError(f"has {twice[0]}, and so has {chain.file}", where=where, fix="Leave one of them out")
-    found = imported_references(inputs[chain.file], place, chain)
+    found = recording.imported_references(inputs[chain.file], place, chain)
     if "point" not in found.columns:
         raise CmmUqError("does not number its values", where=place,
                          fix='Say which column is the number of the point: columns = { point = "…" }')  # fmt: skip
@@ -78,7 +78,7 @@ def with_references(
                          fix="Number points as the certificate does, or leave the point out")  # fmt: skip
     index = np.array([rows[number] for number in points.point.tolist()], dtype=np.int64)
     columns = {name: values[index] for name, values in found.columns.items() if name in REFERENCES}
-    if EXPANDED in columns and (stated := COVERAGE.search(found.recognised.columns[EXPANDED])):
+    if EXPANDED in columns and (stated := header.COVERAGE.search(found.recognised.columns[EXPANDED])):
         k = float(stated[1].replace(",", "."))
         if artefact.k not in (None, k) or not 1 <= k <= 10:
             raise CmmUqError(f"says k = {k:g} in a heading", where=place, fix="Mend it, or [artefact] k")

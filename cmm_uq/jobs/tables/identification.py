@@ -103,7 +103,7 @@ REPLACED = "replaced-results.json"
 _FIGURES = r"(?:figures?|values?|results?|numbers?|decisions?|outcomes?)"
 _WERTE = r"(?:(?:mess|zahlen)?werte?n?|zahl(?:en)?|ergebnis(?:se)?n?|entscheidung(?:en)?)"
 _VALEURS = r"(?:valeurs?|chiffres?|résultats?|décisions?)"
-_NOTHING_CHANGED = re.compile(
+_NOTHING_CHANGED = (
     rf"\bno (?:other |measured |further )?{_FIGURES}\b|\bnone of the {_FIGURES}\b|\b{_FIGURES}: none\b"
     rf"|\bnothing (?:else )?(?:is |was |has |has been )?chang|\bno (?:other |further )?changes?\b"
     rf"|\bwithout (?:any )?changes?\b|\b{_FIGURES}\b[^.;]{{0,30}}\b(?:unchanged|unaltered|unaffected|the same|not (?:been )?"
@@ -114,8 +114,7 @@ _NOTHING_CHANGED = re.compile(
     rf"|\baucune? (?:autre )?{_VALEURS}\b|\baucun changement|\baucune modification|\bsans (?:changement|modification)"
     rf"|\brien n['’ ]?a changé|\b{_VALEURS}\b[^.;]{{0,30}}\b(?:inchangée?s?|ne changent pas|n['’]ont pas changé)"
     r"|変更(?:は|が)?(?:な[しい]|ありません|ございません)|(?:数値|結果|値|判定)[^。;]{0,12}"
-    r"(?:不変|変わらない|変わりません|変わっていない|変わっていません|変わりな[しい]|変更な[しい]|同じ|変更されていない|変更していない)",
-    re.IGNORECASE,
+    r"(?:不変|変わらない|変わりません|変わっていない|変わっていません|変わりな[しい]|変更な[しい]|同じ|変更されていない|変更していない)"
 )
 """The usual ways, in the languages of certificates, of saying that figures or decisions did not change."""
 
@@ -149,7 +148,7 @@ class ReplacedCertificate(JobTable):
 
 def denies_a_change(words: str) -> bool:
     """Whether words say that no figure, or nothing, is changed."""
-    return _NOTHING_CHANGED.search(" ".join(words.split())) is not None
+    return re.search(_NOTHING_CHANGED, " ".join(words.split()), re.IGNORECASE) is not None
 
 
 class Identification(JobTable):

@@ -6,16 +6,18 @@ import datetime as dt
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.job import JobFile
-from cmm_uq.jobs.part.tables import PartFile
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.facts import KEY, PART, PERFORMANCE, ChainHead
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.part.tables import PartFile
 
 Named = Callable[[str], str]  # how a value is called in the field, by its name: ``scale_x.ppm``
 
@@ -96,7 +98,7 @@ def unit_of(name: str) -> str:
 def _of_job(facts: JobFile | PartFile) -> dict[str, Any]:
     laboratory = facts.laboratory
     persons = {"operator": facts.job.operator or laboratory.signatory, "four_eyes": laboratory.four_eyes}
-    if isinstance(facts, PartFile):
+    if not isinstance(facts, JobFile):
         return persons | {"points": facts.recording.recorded if facts.recording else ""}
     job, machine, artefact = facts.job, facts.machine, facts.artefact
     chain = artefact.certificate

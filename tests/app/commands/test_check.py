@@ -27,7 +27,7 @@ from cmm_uq.base.points import Machine
 from cmm_uq.certificate.clauses import formal_warnings, traceability_section
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.jobs.importing.format import ImportKeys
-from cmm_uq.jobs.importing.recording import read_recording
+from cmm_uq.jobs.recording.own import read_recording
 from tests.app.cli.process import run
 from tests.conftest import MACHINE_JOBS, ROOT
 from tests.jobs.importing.exports import EXPORTS, NUMBERS, XYZ

@@ -6,7 +6,7 @@ import re
 
 from cmm_uq.base.files import csv_table as numbers, limits, table
 from cmm_uq.jobs import columns
-from cmm_uq.jobs.importing import recording
+from cmm_uq.jobs.recording import own
 from cmm_uq.jobs.tables.machine import SHORTEST_TRAVEL_MM
 from tests.conftest import ROOT
 
@@ -39,7 +39,7 @@ def test_the_ranges_of_the_page_are_those_of_the_code() -> None:
         f"| `…_um` | {plain(columns.LARGEST_OF['_um'])} |",
         f"| `…_c` | {plain(columns.LARGEST_OF['_c'])} |",
         f"`…_deg` | {plain(columns.LARGEST_OF['_deg'])} |",
-        f"between {plain(recording.SHORTEST_NORMAL)} and {plain(recording.LONGEST_NORMAL)} is refused",
+        f"between {plain(own.SHORTEST_NORMAL)} and {plain(own.LONGEST_NORMAL)} is refused",
         f"−{plain(table.LONGEST_MM)} … {plain(table.LONGEST_MM)}; a travel of at least {plain(SHORTEST_TRAVEL_MM)}",
         f"| `u_coordinate_um`, limits, µm | {plain(table.SMALLEST_UM)} … {plain(table.LARGEST_UM)} |",
         f"0, or {plain(table.SMALLEST_UM)} … {plain(table.LARGEST_UM)} |",

@@ -9,7 +9,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing.format import ImportKeys
-from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example, imported, points_of
+from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example, imported
+from cmm_uq.jobs.recording.own import points_of
 from tests.jobs.importing import laboratory, unseen
 from tests.jobs.importing.laboratory import Export, text
 

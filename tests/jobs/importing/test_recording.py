@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.columns import largest
-from cmm_uq.jobs.importing.recording import read_recording
+from cmm_uq.jobs.recording.own import read_recording
 
 HEADER = "measurement,point,x_mm,y_mm,z_mm"
 

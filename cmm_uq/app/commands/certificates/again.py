@@ -34,8 +34,8 @@ from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platfor
 from cmm_uq.certificate.verify import views
 from cmm_uq.certificate.verify.again import Again, compare_again, compare_figures, plugins_missing
 from cmm_uq.certificate.verify.given import AGAIN, RESULTS, Given, Inquiry
-from cmm_uq.jobs.importing.recording import header, is_own
 from cmm_uq.jobs.job import Job, Recorded
+from cmm_uq.jobs.recording.own import header, is_own
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records import content as contents
 from cmm_uq.laboratory.records.facts import PART, STANDING, ChainHead, Heads, RecordedCertificate, RecordedValue

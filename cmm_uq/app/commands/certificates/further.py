@@ -29,7 +29,6 @@ from cmm_uq.base.messages import Text, Verbatim, after, day, number, say
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.origin import NO_FURTHER, FurtherCertificate, FurtherCertificates, PassedTest
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.machine_state import PassedFacts
 from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED
 from cmm_uq.jobs.tables.machine import FurtherFacts
 from cmm_uq.machine.model.artefact_doubt import causes_of
@@ -42,6 +41,7 @@ from cmm_uq.maths.inference.posterior import Cause, Doubt, NoisyPosterior
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.verification import Computing, Verification
     from cmm_uq.jobs.part.job import PartJob
+    from cmm_uq.jobs.part.machine_state import PassedFacts
 
 # quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
 # show of errors left out. Those of all further recordings together.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +17,13 @@ from cmm_uq.base.messages import Text, Verbatim, day, number, say
 from cmm_uq.base.points import AXES, Floats, Machine, beyond_travel
 from cmm_uq.base.units import METRE, MICROMETRE
 from cmm_uq.certificate.origin import PassedTest
-from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.jobs.part.machine_state import PassedFacts
 from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.measurement import RecordingModel
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.job import Job
+    from cmm_uq.jobs.part.job import PartJob
+    from cmm_uq.jobs.part.machine_state import PassedFacts
 
 
 def refuse_passed(

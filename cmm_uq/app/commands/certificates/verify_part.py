@@ -24,14 +24,7 @@ from cmm_uq.certificate.part.measurement import standing_data
 from cmm_uq.certificate.verify.again import Again, check_results
 from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_part_figures, check_part_job, check_standing, check_verdicts
-from cmm_uq.certificate.verify.given import (
-    AGAIN,
-    NOT_ASKED,
-    RESULTS,
-    Given,
-    Inquiry,
-    language_of,
-)
+from cmm_uq.certificate.verify.given import AGAIN, NOT_ASKED, RESULTS, Given, Inquiry, language_of
 from cmm_uq.jobs.part.job import PartJob, part_of
 from cmm_uq.jobs.source import sha256
 from cmm_uq.laboratory.records.facts import ChainHead, Heads

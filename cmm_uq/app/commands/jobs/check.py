@@ -26,11 +26,10 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.clauses import Requirement, certifies, clauses, contradictions, missing
-from cmm_uq.jobs.importing.format import ImportKeys
-from cmm_uq.jobs.importing.lines import SAME_PLACE
-from cmm_uq.jobs.importing.recording import is_own, read_recording
+from cmm_uq.jobs.importing.format import SAME_PLACE, ImportKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import PART, is_part
+from cmm_uq.jobs.recording.own import is_own, read_recording
 from cmm_uq.jobs.source import inside
 from cmm_uq.jobs.tables.identification import MEASURED
 from cmm_uq.machine.physics.catalogue import effects

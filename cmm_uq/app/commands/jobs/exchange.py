@@ -24,14 +24,8 @@ from cmm_uq.jobs.importing.cells.stated import Offer, offers
 from cmm_uq.jobs.importing.format import ImportKeys, Recognition, format_of
 from cmm_uq.jobs.importing.lengths.placing import proposed as proposed
 from cmm_uq.jobs.importing.lines import UnplacedRunsError, axis_place
-from cmm_uq.jobs.importing.recording import (
-    ImportedTable,
-    UnplacedError,
-    example as example,
-    imported,
-    points_of,
-    read_recording,
-)
+from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example as example, imported
+from cmm_uq.jobs.recording.own import points_of, read_recording
 from cmm_uq.jobs.reports import ReportResults, read_results
 from cmm_uq.jobs.source import RESULTS
 

@@ -35,8 +35,9 @@ from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.jobs.importing.format import ImportKeys
-from cmm_uq.jobs.importing.recording import ImportedTable, imported, is_own, read_recording
+from cmm_uq.jobs.importing.recording import ImportedTable, imported
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.recording.own import is_own, read_recording
 from cmm_uq.jobs.source import inside
 from cmm_uq.jobs.tables.identification import MEASURED, SIMULATED
 from cmm_uq.jobs.tables.plan import DeclaredSource

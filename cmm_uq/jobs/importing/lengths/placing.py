@@ -24,12 +24,7 @@ Elsewhere = Sequence[tuple[str, str, str]]
 
 
 def stated_places(
-    names: Sequence[str],
-    texts: Sequence[str],
-    elsewhere: Elsewhere,
-    measured_mm: Sequence[float],
-    mm: float,
-    sign: str,
+    names: Sequence[str], texts: Sequence[str], elsewhere: Elsewhere, measured_mm: Sequence[float], mm: float, sign: str
 ) -> dict[str, tuple[str, str]]:
     """Where lines lie by the texts of each of their lengths, in mm with ``?`` for what is open, and the words that say it.
 
