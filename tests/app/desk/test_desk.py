@@ -253,14 +253,17 @@ def test_a_folder_that_cannot_be_new_is_told_and_nothing_is_lost(worked: Visitor
 def test_what_was_filled_in_last_is_there_the_next_time(worked: Visitor) -> None:
     draft = draft_of(worked, EXPORT.read_bytes(), EXPORT.name)
     page = worked.get(f"/desk/fields?draft={draft}&kind=ballbar").text
-    assert re.search(r'name="conformity.standard"[^>]*value="[A-Z]', page), "how the laboratory works is filled in"
+    chosen = r'name="conformity.standard"[^>]*>(?:\s*<option[^>]*>[^<]*</option>)*?\s*<option value="([^"]*)" selected'
+    assert re.findall(chosen, page) == ["ASME B89.4.1-1997"], "how the laboratory works is filled in"
     assert re.search(r'name="conformity.limit_um"[^>]*value=""', page), "the limit of another machine is not"
     page = worked.get(f"/desk/fields?draft={draft}&kind=step_gauge").text
     # what another machine, artefact or kind of measurement has is offered alone
-    for key in ("machine.name", "artefact.U_um", "conformity.standard"):
+    assert re.findall(chosen, page) == [""]
+    assert "The last time: ASME B89.4.1-1997" in page
+    for key in ("machine.serial", "artefact.U_um"):
         assert re.search(rf'name="{key}"[^>]*value=""', page)
         assert re.search(rf'<datalist id="[^"]*-{key}-again"><option value="[^"]', page)
-    assert "The last time: CMM 3" in page
+    assert "The last time: 1102" in page
     assert re.search(r'name="job.date"[^>]*value=""', page), "a date is of one measurement"
 
 

@@ -44,6 +44,11 @@ class Sitting:
         found = Axe().run(self.page, options=options).response["violations"] if axe else []
         self.wrong += [(self.page.url, one["id"], [node["html"][:120] for node in one["nodes"]][:2]) for one in found]
 
+    def state(self, name: str, value: str) -> None:
+        """Fill in a field, or choose of its list."""
+        field = self.page.locator(f'[name="{name}"]')
+        field.select_option(value) if field.evaluate("one => one.tagName") == "SELECT" else field.fill(value)
+
     def press(self, name: str) -> None:
         self.page.get_by_role("button", name=name, exact=True).click()
 
@@ -90,7 +95,7 @@ def test_from_an_empty_folder_to_a_certificate_the_same_as_the_command_s(sitting
     page.get_by_role("link", name=re.compile("Ballbar")).first.click()
     page.fill("[name=folder]", "K-1")
     for name, value in ANSWERS.items():
-        page.fill(f'[name="{name}"]', value)
+        sitting.state(name, value)
     page.locator(".says .open").wait_for()
     assert "Nothing would stop" in page.locator(".says").inner_text()
     page.fill('[name="artefact.length_mm"]', "399")
@@ -186,7 +191,7 @@ def test_without_a_script_the_way_is_the_same(browser: Browser, tmp_path: Path) 
         page.get_by_role("link", name=re.compile("Ballbar")).first.click()
         page.fill("[name=folder]", "K-1")
         for name, value in ANSWERS.items():
-            page.fill(f'[name="{name}"]', value)
+            sitting.state(name, value)
         page.fill('[name="artefact.length_mm"]', "399")
         sitting.press("Check")
         assert "404.205" in page.locator(".notice").inner_text()

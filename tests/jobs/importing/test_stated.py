@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.jobs.importing.cells.stated import AIR, ARTEFACT, offers
-from cmm_uq.jobs.importing.format import ImportKeys, format_of
+from cmm_uq.jobs.importing.format import ImportKeys
 
 HERE = Path(__file__).parent
 TABLE = "\nPosition;Nominal [mm];Actual [mm]\n1;100;100.001\n1;200;200.002\n"
@@ -15,7 +15,7 @@ TABLE = "\nPosition;Nominal [mm];Actual [mm]\n1;100;100.001\n1;200;200.002\n"
 
 def said(text: str | bytes, name: str = "export.txt") -> dict[str, str]:
     content = text.encode() if isinstance(text, str) else text
-    return {one.key: one.value for one in offers(format_of(content, name), content, name, ImportKeys())}
+    return {one.key: one.value for one in offers(content, name, ImportKeys())}
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from cmm_uq.jobs.columns import WHOLE
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.importing.answers import as_file, folder, matching, path_of
 from cmm_uq.jobs.importing.cells.stated import Offer, offers
-from cmm_uq.jobs.importing.format import ImportKeys, Recognition, format_of
+from cmm_uq.jobs.importing.format import ImportKeys, Recognition
 from cmm_uq.jobs.importing.lengths.placing import proposed as proposed
 from cmm_uq.jobs.importing.lines import UnplacedRunsError, axis_place
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, example as example, imported
@@ -56,7 +56,7 @@ def remember(name: str, keys: ImportKeys, head: tuple[str, ...]) -> Path:
 def offered(path: Path, keys: ImportKeys) -> tuple[Offer, ...]:
     """What an export says of its measurement around the table."""
     content = content_of(path, TABLE_BYTES, "Check its name")
-    return offers(format_of(content, str(path)), content, str(path), keys)
+    return offers(content, str(path), keys)
 
 
 @naming_package()

@@ -31,7 +31,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM, Truth
 from cmm_uq.jobs.importing.cells.stated import Offer, offers
-from cmm_uq.jobs.importing.format import FileKeys, format_of
+from cmm_uq.jobs.importing.format import FileKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.schema import commented
 from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
@@ -243,7 +243,7 @@ def _day_in(recording: Mapping[str, Any], files: Mapping[str, bytes]) -> Offer |
     name, keys = str(recording.get("file", "")), {k: v for k, v in recording.items() if k in FileKeys.model_fields}
     if name not in files:
         return None
-    found = offers(format_of(files[name], name), files[name], name, FileKeys.model_validate(keys))
+    found = offers(files[name], name, FileKeys.model_validate(keys))
     return next((one for one in found if one.key == "job.date"), None)
 
 

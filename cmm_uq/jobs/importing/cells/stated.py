@@ -16,7 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.importing.cells.encodings import decoded, is_number
-from cmm_uq.jobs.importing.format import FileKeys, Format, ImportKeys
+from cmm_uq.jobs.importing.format import FileKeys, Format, ImportKeys, format_of
 from cmm_uq.jobs.importing.header import text_of
 
 _FIRST, _LAST, _LONGEST = 300, 60, 400  # lines at both ends that are looked at, and characters of one
@@ -114,12 +114,14 @@ class Offer:
         )
 
 
-def offers(form: Format, content: bytes, where: str, keys: FileKeys) -> tuple[Offer, ...]:
-    """One of each key that the file says anything of."""
-    lines = [*_lines(form, content, where, keys)]
-    found = [*_days(lines), *_warmths(lines), *_machines(lines), *_limits(lines)]
+def offers(content: bytes, where: str, keys: FileKeys) -> tuple[Offer, ...]:
+    """One of each key that the file says anything of; none of what cannot be read."""
+    try:
+        lines = [*_lines(format_of(content, where), content, where, keys)]
+    except CmmUqError:  # which reading it tells
+        return ()
     by_key: dict[str, list[Offer]] = {}
-    for one in found:
+    for one in (*_days(lines), *_warmths(lines), *_machines(lines), *_limits(lines)):
         by_key.setdefault(one.key, []).append(one)
     return tuple(_one(same) for same in by_key.values())
 
@@ -137,22 +139,21 @@ Line = tuple[int, str, list[str]]  # number, text, cells
 
 def _lines(form: Format, content: bytes, where: str, keys: FileKeys) -> Iterator[Line]:
     """Lines at both ends of a file, as text and as cells; tags of a page or a document are what parts them."""
-    with suppress(CmmUqError):
-        if content.startswith(b"PK"):
-            sheets = form.read(content, where, ImportKeys())
-            rows = [
-                (n, "\t".join(map(text_of, row)))
-                for sheet in sheets
-                for row, n in zip(sheet.rows, sheet.lines, strict=True)
-            ]
-        else:
-            rows = [*enumerate(_plain(form.name, decoded(content, where, keys.encoding)[0]).splitlines(), 1)]
-        both = rows if len(rows) <= _FIRST + _LAST else [*rows[:_FIRST], *rows[-_LAST:]]
-        for number, text in both:
-            cells = [cell.strip("\" \u00a0'") for cell in _CELLS.split(text)] if len(text) < _LONGEST else []
-            words = [cell for cell in cells if cell and not is_number(cell)]
-            if words:
-                yield number, text, [cell for cell in cells if cell]
+    if content.startswith(b"PK"):
+        sheets = form.read(content, where, ImportKeys())
+        rows = [
+            (n, "\t".join(map(text_of, row)))
+            for sheet in sheets
+            for row, n in zip(sheet.rows, sheet.lines, strict=True)
+        ]
+    else:
+        rows = [*enumerate(_plain(form.name, decoded(content, where, keys.encoding)[0]).splitlines(), 1)]
+    both = rows if len(rows) <= _FIRST + _LAST else [*rows[:_FIRST], *rows[-_LAST:]]
+    for number, text in both:
+        cells = [cell.strip("\" \u00a0'") for cell in _CELLS.split(text)] if len(text) < _LONGEST else []
+        words = [cell for cell in cells if cell and not is_number(cell)]
+        if words:
+            yield number, text, [cell for cell in cells if cell]
 
 
 def _plain(form: str, text: str) -> str:
