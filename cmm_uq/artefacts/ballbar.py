@@ -111,6 +111,13 @@ class Ballbar(Artefact):
         relative = displacement[self.rows[:, 1]] - displacement[self.rows[:, 0]]
         return np.asarray(np.einsum("mi,mik->mk", self._directions(xyz), relative), dtype=np.float64)
 
+    def project_along(self, xyz: Floats, direction: Floats, moved: Floats) -> Floats:
+        if type(self).project is not Ballbar.project:  # of a bar whose ends are found otherwise
+            return super().project_along(xyz, direction, moved)
+        relative = moved[self.rows[:, 1]] - moved[self.rows[:, 0]]
+        relative *= (self._directions(xyz) @ direction)[:, None]
+        return relative
+
     def _directions(self, xyz: Floats) -> Floats:
         """From one end to the other, (m, 3), kept for points that nobody can change: a diagnosis asks thousands of times."""
         if self._known[0] is not xyz:

@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.artefacts import artefact_facts
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.artefacts import artefact_facts, kind_of
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.constructions import MACHINE, estimated, free, indicated
+from tests.conftest import ROOT
 from tests.recordings import bar_facts, bars, with_columns
 
 SIX = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]
@@ -116,3 +118,17 @@ def test_a_recording_that_is_none_of_a_bar_is_refused(spoil: object, message: st
     assert callable(spoil)
     with pytest.raises(CmmUqError, match=message):
         Ballbar(BAR, spoil(placed()))
+
+
+@pytest.mark.parametrize(
+    "job", ["iota-1102-20C", "optical-ballbar-simulated", "step-gauge-simulated", "sphere-simulated"]
+)
+def test_of_points_that_all_move_along_one_direction_the_same_is_seen(job: str) -> None:
+    """By fewer steps, as of points that move anyhow."""
+    read = read_job(ROOT / "examples" / job)
+    artefact = kind_of(read).observing("measured")(read.facts.artefact, read.points)
+    moved = np.random.default_rng(5).standard_normal((len(read.points), 3))
+    direction = np.array([0.6, -0.64, 0.48])
+    seen = artefact.project(read.points.xyz, direction[:, None] * moved[:, None])
+    np.testing.assert_allclose(artefact.project_along(read.points.xyz, direction, moved), seen, atol=1e-12)
+    assert np.abs(seen).max() > 0.1

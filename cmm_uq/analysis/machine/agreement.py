@@ -37,6 +37,7 @@ DISAGREES = 0.001  # probability with which anything of a machine whose model fi
 _ON_LINE = 0.05  # extent of points across a line over that along it
 # lines that are looked at, evenly of all; sizes of the noise, over which its variance is the mean
 _LINES, _SIZES = 200, 200
+_AT_ONCE = 2_000_000  # weights of observations in slopes that are held at once
 
 Key = tuple[str, str]
 Kind = Literal["factor", "line", "length"]
@@ -136,23 +137,27 @@ class RecordedDraws:
         return rest[np.isfinite(sd[rest])], rest[~np.isfinite(sd[rest])]
 
     @cached_property
-    def _lines(self) -> tuple[list[int], Floats]:
-        """Lines by their measurement, and weights (l, m) of the observations in the slope of each, mm/mm.
+    def _lines(self) -> tuple[list[int], scipy.sparse.csr_array, Floats, Floats]:
+        """Lines by their measurement, and weights W − A·B (l, m) of the observations in the slope of each, mm/mm.
 
-        Of sizes that nobody certified less what they would make.
+        W (l, m) is of few observations each; A (l, s) and B (s, m) take what sizes that nobody certified would make.
         """
         found, design = list(lines_of(self.model)), self.model.estimate().linear.design
-        weights, free = np.reshape([each for _, each in found], (len(found), len(design))), design[:, self._sizes[1]]
-        return [number for number, _ in found], weights - (weights @ free) @ np.linalg.pinv(free)
+        each = [scipy.sparse.csr_array((0, len(design))), *(scipy.sparse.csr_array(one[None]) for _, one in found)]
+        weights = scipy.sparse.csr_array(scipy.sparse.vstack(each))
+        free = design[:, self._sizes[1]]
+        return [number for number, _ in found], weights, np.asarray(weights @ free), np.asarray(np.linalg.pinv(free))
 
     @cached_property
     def _seen(self) -> tuple[Floats, Floats]:
         """By which estimates of the unknowns (k, f), and slopes of lines (l, f), change with a unit of each of the others."""
-        gains, lines = gain(self.model.estimate().linear, self.sigma_mm)[self.which], self._lines[1]
-        both = [(gains[:, :0], lines[:, :0])]
-        parts = (part for one in self.effects for part in shown_in_parts(self.model, one))
-        both += [(gains @ part, lines @ part) for part in parts]
-        return np.hstack([one for one, _ in both]), np.hstack([one for _, one in both])
+        gains, (_, lines, taken, free) = gain(self.model.estimate().linear, self.sigma_mm)[self.which], self._lines
+        k, both = len(gains), np.vstack([gains, free])
+        dense, slopes = [both[:, :0]], [taken[:, :0]]
+        for part in (part for one in self.effects for part in shown_in_parts(self.model, one, along=True)):
+            dense.append(both @ part)
+            slopes.append(lines @ part - taken @ dense[-1][k:])
+        return np.hstack(dense)[:k], np.hstack(slopes)
 
     @cached_property
     def factors(self) -> Floats:
@@ -161,17 +166,21 @@ class RecordedDraws:
 
     def slopes(self, doubt: Doubt) -> Figures:
         """Of each line by itself, as read and by the draws, µm/m; ``doubt``: what is stated to be in doubt about readings."""
-        linear, (numbers, weights), (known, _) = self.model.estimate().linear, self._lines, self._sizes
-        read = weights @ (linear.observed - linear.design[:, known] @ linear.prior_mean[known])
-        drawn = self.own @ (weights @ linear.design[:, self.which]).T + self.further @ self._seen[1].T
+        linear, (numbers, sparse, taken, free), (known, _) = self.model.estimate().linear, self._lines, self._sizes
         noise, sizes = components_of(self.model), self.noise.at(evenly(len(self.own), _SIZES))
-        squares = noise.shares.T @ np.asarray(noise.turn @ weights.T) ** 2
-        variance = noise.variances(sizes)[0].mean(axis=0) @ squares
-        variance = variance + ((weights @ linear.design[:, known]) ** 2) @ linear.prior_sd[known] ** 2
-        of_doubt = Doubt.of(doubt.causes, weights)
-        for i, one in enumerate(weights):
-            variance[i] += noise.slow_along(one, sizes).mean() + of_doubt.variance(np.eye(len(weights))[i])
-        u, mean, sd = np.sqrt(variance), drawn.mean(axis=0), drawn.std(axis=0)
+        observed = linear.observed - linear.design[:, known] @ linear.prior_mean[known]
+        fast, read, u = noise.variances(sizes)[0].mean(axis=0), np.empty(len(numbers)), np.empty(len(numbers))
+        moved = np.empty((len(numbers), len(self.which)))
+        for some in np.array_split(np.arange(len(numbers)), 1 + len(numbers) * len(observed) // _AT_ONCE):
+            weights = sparse[some].toarray() - taken[some] @ free
+            read[some], moved[some] = weights @ observed, weights @ linear.design[:, self.which]
+            variance = fast @ (noise.shares.T @ np.asarray(noise.turn @ weights.T) ** 2)
+            variance += ((weights @ linear.design[:, known]) ** 2) @ linear.prior_sd[known] ** 2
+            of_doubt, slow = Doubt.of(doubt.causes, weights), (noise.slow_along(one, sizes).mean() for one in weights)
+            variance += np.array([*map(of_doubt.variance, np.eye(len(some)))]) + np.array([*slow])
+            u[some] = np.sqrt(variance)
+        drawn = self.own @ moved.T + self.further @ self._seen[1].T
+        mean, sd = drawn.mean(axis=0), drawn.std(axis=0)
         return Figures("line", numbers, (unit("µm/m"),) * len(numbers), *(each / PPM for each in (read, u, mean, sd)))
 
 

@@ -146,15 +146,18 @@ def shown_by(model: RecordingModel, effect: Effect) -> Floats:
     return np.hstack([*shown_in_parts(model, effect)])
 
 
-def shown_in_parts(model: RecordingModel, effect: Effect) -> Iterator[Floats]:
-    """The same, of some of the coefficients after the others."""
+def shown_in_parts(model: RecordingModel, effect: Effect, *, along: bool = False) -> Iterator[Floats]:
+    """The same, of some of the coefficients after the others; ``along`` a straight motion in fewer steps."""
     if not recorded(model, effect):
         yield np.zeros((int(model.used.sum()), len(effect.coefficients)))
         return
     about = model.estimate().about
     acting = model.about(about)
     for part in effect.parts(acting.points) if isinstance(effect, GivenPeriod) else (effect,):
-        yield model.seen(acting.columns(part), about)
+        if (motion := acting.motion(part) if along else None) is None:
+            yield model.seen(acting.columns(part), about)
+        else:
+            yield -model.artefact.project_along(model.where(about), *motion)[model.used]
 
 
 def sd_of(effect: Effect) -> Floats:

@@ -213,7 +213,9 @@ class DrawnErrors:
             there, (a, b) = acting.select(which), ends.reshape(-1, 2).T
             columns = [np.zeros((len(some), 0))]
             for one in (*model.effects, *self.field.effects):
-                if recorded(model, one):
+                if recorded(model, one) and (motion := there.motion(one)) is not None:
+                    columns.append((along[some] @ motion[0])[:, None] * (motion[1][a] - motion[1][b]))
+                elif recorded(model, one):
                     errors = there.columns(one)
                     columns.append(np.einsum("mi,mik->mk", along[some], errors[a] - errors[b]))
                 else:  # as other recordings show it

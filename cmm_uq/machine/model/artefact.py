@@ -166,6 +166,10 @@ class Artefact(ABC):
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
         """Change of the observations, (m, k) in mm, when the points at ``xyz`` (n, 3) move by ``displacement`` (n, 3, k)."""
 
+    def project_along(self, xyz: Floats, direction: Floats, moved: Floats) -> Floats:
+        """The same when they all move along one direction (3,), by ``moved`` (n, k)."""
+        return self.project(xyz, direction[:, None] * moved[:, None])
+
     def size_change(self) -> Floats:
         """Change of the observations, (m, s), for one mm of each size."""
         return np.zeros((len(self.rows), 0))

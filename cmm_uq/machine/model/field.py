@@ -22,7 +22,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import scipy
@@ -53,7 +53,7 @@ READ: Mapping[str, Text] = {  # of axes of which it is stated how they are read
 # root mean square that physics allows: µm along an axis beyond its scale, µm across it, ″
 ALLOWED = {POSITION: 20.0, STRAIGHTNESS: 50.0, ROTATION: 30.0}
 _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
-_AT_ONCE = 1_000_000  # covariances of readings, or displacements, that are held at once
+_AT_ONCE, _PAIRS = 1_000_000, 50_000  # displacements, and covariances of readings, that are held at once
 _MANY, _FEW = 20_000, 1000  # readings up to which the covariance is taken of each; up to which, where cells are known
 _PERIODS, _DEGREE = 8, 60  # shortest periods in a cell of an axis, and polynomials: off by 10⁻¹³ of the largest
 _LOOKED_AT = 61  # readings
@@ -155,6 +155,9 @@ class AtPoints(Effect):
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return along(str(self.along_motion), self.component)
 
+    def travelled(self, points: Points) -> Floats:
+        return self.component
+
 
 class EveryPeriod(Effect):
     """All trial periods of an effect at once; without a shape of its own."""
@@ -202,7 +205,10 @@ class GivenPeriod(Effect):
         self._cells: dict[float, Floats] = {}  # polynomials (q, r), by cell of the axis
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.axis, self.at(points.readings[self.axis]))
+        return along(self.axis, self.travelled(points))
+
+    def travelled(self, points: Points) -> Floats:
+        return self.at(points.readings[self.axis])
 
     def parts(self, points: Points) -> Iterator[Effect]:
         """Some of its coefficients each, at these points alone: all together at a hundred thousand fill half a gigabyte."""
@@ -219,17 +225,22 @@ class GivenPeriod(Effect):
     def _said(self, reading: Floats) -> Floats:
         """At many readings by polynomials in cells of the axis, for no wave is shorter than the shortest period."""
         if len(reading) <= (_FEW if self._cells else _MANY):
-            parts = np.array_split(reading, 1 + len(reading) * len(self.readings) // _AT_ONCE)
+            parts = np.array_split(reading, 1 + len(reading) * len(self.readings) // _PAIRS)
             return np.concatenate([covariance(self.of, part, self.readings) @ self.into for part in parts])
         length = _PERIODS * float(np.min(self.sum.at))
         place, found = reading / length, np.empty((len(reading), self.into.shape[1]))
-        order, nodes = np.argsort(place), np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
-        for rows in np.split(order, 1 + np.flatnonzero(np.diff(np.floor(place[order])))):
-            cell = float(np.floor(place[rows[0]]))
-            if cell not in self._cells:
-                values = self._said((cell + 0.5 + 0.5 * nodes) * length)
-                self._cells[cell] = np.asarray(np.linalg.inv(chebvander(nodes, _DEGREE - 1)) @ values, dtype=np.float64)
-            found[rows] = chebvander(2 * (place[rows] - cell) - 1, _DEGREE - 1) @ self._cells[cell]
+        nodes = np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
+        for some in np.array_split(np.argsort(place), 1 + len(place) * _DEGREE // _AT_ONCE):
+            cells = np.floor(place[some])
+            polynomials = chebvander(2 * (place[some] - cells) - 1, _DEGREE - 1)
+            ends = np.flatnonzero(np.diff(cells, prepend=np.nan, append=np.nan)).tolist()
+            for first, last in pairwise(ends):
+                if (cell := float(cells[first])) not in self._cells:
+                    values = self._said((cell + 0.5 + 0.5 * nodes) * length)
+                    self._cells[cell] = np.asarray(
+                        np.linalg.inv(chebvander(nodes, _DEGREE - 1)) @ values, dtype=np.float64
+                    )
+                found[some[first:last]] = polynomials[first:last] @ self._cells[cell]
         return found
 
     def beforehand(self, random: np.random.Generator, count: int) -> Floats:

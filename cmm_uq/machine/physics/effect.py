@@ -15,7 +15,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import NOTHING, Argument, Message, Text, Verbatim, fields_of
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.base.values import dataclass, replace
 
@@ -145,6 +145,10 @@ class Effect(ABC):
 
         A ``CmmUqError`` where a column or a machine's figure is missing.
         """
+
+    def travelled(self, points: Points) -> Floats:
+        """(n, k) of it along the axis of ``along_motion``, mm, which is all that an effect does that has one."""
+        return self.basis(points)[:, AXES.index(str(self.along_motion))]
 
     def unfit(self, points: Points) -> CmmUqError | None:
         """Why a job of these points cannot name it, if so."""

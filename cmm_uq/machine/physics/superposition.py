@@ -49,6 +49,14 @@ class About:
         found[:, :, 0] = (turned.T * effect.lean(self.points)).T
         return found
 
+    def motion(self, effect: Effect) -> tuple[Floats, Floats] | None:
+        """Of an effect along one motion, that is straight: its direction (3,), and how far each point moves (n, j), mm."""
+        directions, straight = self.points.directions, self.points.machine.axes == tuple(AXES)
+        if effect.along_motion is None or not straight or (directions is not None and directions.ndim > 2):
+            return None
+        axis = AXES.index(effect.along_motion)
+        return (np.eye(3) if directions is None else directions)[axis], effect.travelled(self.points)
+
     def select(self, rows: Ints) -> About:
         """Of some of the points."""
         change = self.change if self.change is None or self.change.ndim == 3 else self.change[:, rows]
