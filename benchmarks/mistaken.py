@@ -25,7 +25,8 @@ import pandas as pd
 import cmm_uq
 from cmm_uq.analysis.diagnosis.comparison.search import search
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.analysis.diagnosis.simulation import SimulationMistakes, simulation_mistakes
+from cmm_uq.analysis.diagnosis.simulated import SimulationMistakes
+from cmm_uq.analysis.diagnosis.simulation import simulation_mistakes
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.model import against_simulation
 from cmm_uq.base.points import Floats

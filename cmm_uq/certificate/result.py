@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.statement import NOT_CONVERGED, Statement, by_standard, by_tolerance
-from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistakes
-from cmm_uq.analysis.machine.regions import FactorRegions
+from cmm_uq.analysis.diagnosis.simulated import SimulatedTwin, SimulationMistakes
 from cmm_uq.analysis.machine.state import of_machine
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base.errors import CmmUqError
@@ -39,6 +38,7 @@ if TYPE_CHECKING:
     from cmm_uq.analysis.conformity.accuracy import Consequences, Costs
     from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
     from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
+    from cmm_uq.analysis.machine.regions import FactorRegions
     from cmm_uq.analysis.planning.set_up import NextPlan, Suggestion
 
 AtLeast = Callable[..., tuple[float, float]]  # U and k as a certificate states them; see StatedUncertainty.raised_to
@@ -257,7 +257,7 @@ class Result:
     def denied(self) -> tuple[tuple[str, str], ...]:
         """Keys of parameters that all errors together deny: of the machine all, where they deny what was read of it."""
         found, effects = self.regions, set[str]()
-        if isinstance(found, FactorRegions):
+        if not isinstance(found, Text):
             read = [one.name for one in self.model.effects if found.agreement.of_readings and of_machine(one)]
             effects = {*read, *(effect for effect, _ in found.agreement.factors)}
         return tuple((effect, name) for effect, named in self.parameters.items() if effect in effects for name in named)

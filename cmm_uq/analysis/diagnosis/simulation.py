@@ -7,8 +7,7 @@ the diagnosis compared with the prediction as it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import scipy
@@ -19,9 +18,10 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, comparison_of
 from cmm_uq.analysis.diagnosis.held_out import held_out_groups, predictions
-from cmm_uq.base.messages import NOTHING as NO_TEXT, Text, number, say, signed
+from cmm_uq.analysis.diagnosis.simulated import SimulationMistake, SimulationMistakes
+from cmm_uq.base.messages import NOTHING as NO_TEXT, number, say, signed
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.base.units import MICROMETRE, Unit, unit
+from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.predicted_errors import PredictedErrors
@@ -38,41 +38,6 @@ _BESIDE = 12  # mistakes of all families beside which further explanations are c
 _FINE, _ROUNDS = 25, 6  # values about the best, and times that those tried close in upon it
 _INVISIBLE = 1e-6  # part of the predicted errors, in what the model leaves, below which a mistake changes nothing
 _ROUNDED = 0.1  # part of the noise's variance from which rounding is told
-
-
-@dataclass(frozen=True)
-class SimulationMistake:
-    name: str
-    title: Text
-    remedy: Text
-    probability: float  # among all that was compared, the diagnosis's explanations of the prediction as it is included
-    # over the prediction as it is, nothing missing; ``None`` where figures say it themselves
-    odds_over_none: float | None
-    odds_over_physics: float | None  # over all that the diagnosis compared with it
-    rms_um: float  # of the residuals without it
-    heldout_rms_um: float  # of predictions of what was left out of the fit
-    elpd_gain: float  # in expected log predictive density of that, and its standard error
-    elpd_gain_se: float
-    value: float | None = None
-    u: float | None = None
-    unit: Unit = mistakes.ONE
-
-
-@dataclass(frozen=True)
-class SimulationMistakes:
-    """Mistakes that remain, most probable first, of how many; ``named``: those of the one group that is asserted."""
-
-    tried: int = 0
-    told: tuple[SimulationMistake, ...] = ()
-    named: tuple[SimulationMistake, ...] = ()
-    why: Text = NO_TEXT  # nothing is named, where something is told
-    rms_before_um: float = 0.0
-    heldout_rms_before_um: float = 0.0
-    rounded: SimulationMistake | None = None
-
-    @property
-    def asserted(self) -> tuple[SimulationMistake, ...]:
-        return (*self.named, *([self.rounded] if self.rounded else []))
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,27 +243,3 @@ def _rounded(found: PredictedErrors, sigma: float, rms_um: float, heldout_um: fl
     more = say("Let the simulation write more digits, or state u_um = {u:.2g} in [simulation].", u=u)
     gone = 1.0, None, None, left * rms_um, left * heldout_um, 0.0, 0.0
     return SimulationMistake("rounded", title, more, *gone, step, 0.0, unit("µm"))
-
-
-@dataclass(frozen=True, eq=False)
-class SimulatedTwin:
-    files: Mapping[str, str]  # SHA-256 by name
-    program: str
-    maps: bool
-    u_um: float  # of a predicted coordinate, root mean square
-    u_common_um: float  # of the artefact's size
-    u_turned_um: float  # besides, because the artefact was taken to lie in another direction
-    contains: tuple[str, ...]  # its effects
-    refitted: tuple[str, ...]  # those that were estimated anew
-    shift_mm: tuple[float, ...]  # of its frame against the recording's
-    turn_deg: float
-    farthest_mm: float  # from a recorded point to the predicted one
-    rms_predicted_um: float  # in the observations
-
-    def data(self, corrections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-        return {
-            "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
-            "u_um": self.u_um, "u_common_um": self.u_common_um, "u_turned_um": self.u_turned_um,
-            "effects": list(self.contains), "refitted": dict(corrections), "farthest_mm": self.farthest_mm,
-            "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg}, "rms_predicted_um": self.rms_predicted_um,
-        }  # fmt: skip

@@ -67,8 +67,7 @@ def new(
     On a terminal it asks for machine, artefact and limits, of a part for the machine's certificate, features, datums and
     tolerances, unless one of the options gives something.
     """
-    from cmm_uq.app.commands.jobs.new import BUDGET, check_empty, known, titles, write_new
-    from cmm_uq.app.commands.parts.new import PART
+    from cmm_uq.app.commands.jobs.new import BUDGET, PART, check_empty, known, titles, write_new
 
     if not kind:
         kinds = titles()

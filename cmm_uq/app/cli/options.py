@@ -41,8 +41,7 @@ def toml_files(incomplete: str) -> list[str]:
 
 def kinds(incomplete: str) -> list[str]:
     """What a new job can be, those of other packages too."""
-    from cmm_uq.app.commands.jobs.new import BUDGET, PLAN, known
-    from cmm_uq.app.commands.parts.new import PART
+    from cmm_uq.app.commands.jobs.new import BUDGET, PART, PLAN, known
 
     return [name for name in (*known(), PLAN, PART, BUDGET) if name.startswith(incomplete)]
 

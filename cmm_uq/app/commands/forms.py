@@ -24,7 +24,6 @@ from cmm_uq.jobs.derived_job import Truth
 from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
-from cmm_uq.laboratory.schedule.settings import ScheduleFile
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect, Parameter
 from cmm_uq.machine.physics.stated import physics_of
@@ -64,10 +63,16 @@ def part() -> Schema:
     return schema_of(PartFile, "job.toml of a part, for cmm-uq")
 
 
+def schedule() -> Schema:
+    from cmm_uq.laboratory.schedule.settings import ScheduleFile
+
+    return schema_of(ScheduleFile, "schedule.toml of cmm-uq")
+
+
 SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
     "job": job, "part": part, "budget": budget, "truth": lambda: schema_of(Truth, "truth.toml of cmm-uq"),
     "instrument": lambda: schema_of(ProfileFile, "instrument profile of cmm-uq"),
-    "schedule": lambda: schema_of(ScheduleFile, "schedule.toml of cmm-uq"),
+    "schedule": schedule,
 })  # fmt: skip
 
 

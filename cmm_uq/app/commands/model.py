@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
+from cmm_uq.analysis.diagnosis.simulated import SimulatedTwin
 from cmm_uq.analysis.screening.columns import Finding, finding
 from cmm_uq.analysis.screening.screening import counted_with, screen_recording
 from cmm_uq.analysis.screening.shape import Screening

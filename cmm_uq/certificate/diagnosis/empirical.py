@@ -14,7 +14,7 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.empirical.model import ODDS, EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
-from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin, SimulationMistake, SimulationMistakes
+from cmm_uq.analysis.diagnosis.simulated import SimulatedTwin, SimulationMistake, SimulationMistakes
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, lines, number, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.sections import region_words

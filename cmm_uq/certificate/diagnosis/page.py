@@ -11,7 +11,7 @@ from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
 from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
+from cmm_uq.analysis.diagnosis.simulated import SimulatedTwin
 from cmm_uq.analysis.planning.set_up import odds_words
 from cmm_uq.base import messages
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, names, number, say, together

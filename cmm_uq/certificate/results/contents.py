@@ -16,7 +16,7 @@ from cmm_uq.analysis.diagnosis.empirical.model import EmpiricalFunction
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.analysis.diagnosis.power import ALLOWED
-from cmm_uq.analysis.diagnosis.simulation import SimulatedTwin
+from cmm_uq.analysis.diagnosis.simulated import SimulatedTwin
 from cmm_uq.analysis.diagnosis.smallest import PLACES, SmallestEffect
 from cmm_uq.analysis.planning.set_up import NextPlan
 from cmm_uq.analysis.screening.columns import Finding

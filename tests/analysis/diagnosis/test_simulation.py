@@ -14,7 +14,7 @@ import pytest
 from benchmarks.mistaken import BARS, FIELDS, MAP, NAMES, PLATE, Errors, mistakes_of, recorded
 from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
 from cmm_uq.analysis.diagnosis.mistakes import Hypothesis, PredictedObservations, hypotheses
-from cmm_uq.analysis.diagnosis.simulation import SimulationMistakes
+from cmm_uq.analysis.diagnosis.simulated import SimulationMistakes
 from cmm_uq.app.commands.diagnose import write_diagnosis
 from cmm_uq.app.commands.model import against_simulation
 from cmm_uq.app.commands.reading import compared_with_frame

@@ -14,12 +14,11 @@ import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cmm_uq.app.commands.forms import shipped
-from cmm_uq.app.commands.parts.new import PART, Answers, part_files, part_of_answers, part_of_drawing
 from cmm_uq.app.commands.reading import job_of, unwritten
 from cmm_uq.artefacts import kind_named, names
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
@@ -33,12 +32,16 @@ from cmm_uq.jobs.derived_job import PROGRAM, Truth
 from cmm_uq.jobs.importing.cells.stated import Offer, offers
 from cmm_uq.jobs.importing.format import FileKeys
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reading import PART as PART
 from cmm_uq.jobs.schema import commented
 from cmm_uq.jobs.tables.identification import EXAMPLE, MEASURED, SIMULATED, Origin, first_line
 from cmm_uq.machine.model.kind import MACHINE, Beginning, Kind
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.stated import physics_of
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.parts.new import Answers
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
 REST = "docs/reference/job.md, cmm-uq schema job, or what an editor that knows TOML schemas completes"
@@ -274,10 +277,13 @@ def write_new(
         raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
     if name == BUDGET:
         files = budget_files()
-    elif name == PART and answers is not None:
-        files = part_of_answers(answers, id=id)
     elif name == PART:
-        files = part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id)
+        from cmm_uq.app.commands.parts.new import part_files, part_of_answers, part_of_drawing
+
+        if answers is not None:
+            files = part_of_answers(answers, id=id)
+        else:
+            files = part_of_drawing(drawing, given, id=id) if drawing else part_files(given, id=id)
     else:
         files = new_plan(given, id=id) if name == PLAN else new_job(name, given, id=id)
     return put_new(folder, Owner("new", id, MEASURED if name in (BUDGET, PLAN) else SIMULATED), files)
