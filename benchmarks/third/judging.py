@@ -80,9 +80,9 @@ def judged(found: Hidden, truth: Record, said: Record, oracle: Record) -> Judged
         good = _effect(found, kind, each["effect"], group, own, every, effects if fits else [])
         together = float(each.get("probability_together", each["probability"]))
         one.names.append(Name(each["effect"], together if group else float(each["probability"]), good, not good, False))
-        members = sorted(name for name in {each["effect"], *group} if name in every)
-        if len(members) > 1 and found.errors:
-            one.classes.append((len(members), _parted(found, effects, each["effect"], members, every)))
+        stood_for = [one for one in stand_ins(each, said) if all(name in every for name in (*one[0], *one[1]))]
+        if stood_for and found.errors:
+            one.classes.append((1 + len(stood_for), _parted(found, effects, stood_for, every)))
     if outside is None:
         if kind != "nothing":
             names = {each["effect"]: {"group": group_of(each, said)} for each in said.get("effects", ())}
@@ -129,13 +129,22 @@ def _effect(found: Hidden, kind: str, name: str, group: set[str], own: dict[str,
 
 
 def _parted(
-    found: Hidden, effects: list[str], name: str, members: list[str], every: dict[str, list[np.ndarray]]
+    found: Hidden, effects: list[str], stood_for: list[tuple[set[str], set[str]]], every: dict[str, list[np.ndarray]]
 ) -> int:
     """How many members of a class the recording, its noise known, parts from the best of them by likelihoods of 20 : 1."""
-    rest = [key for key in effects if key != name]
     y = found.seen.rest @ found.one.y
-    left = np.array([left_by(found, [*rest, member], every, y) for member in members])
+    sets = [effects, *([*(name for name in effects if name not in gone), *come] for gone, come in stood_for)]
+    left = np.array([left_by(found, [*dict.fromkeys(one)], every, y) for one in sets])
     return int(np.sum(0.5 * (left**2 - left.min() ** 2) > DECIDED))
+
+
+def stand_ins(effect: Record, said: Record) -> list[tuple[set[str], set[str]]]:
+    """What is said to stand in the place of an effect: what goes, and what comes, each effect or set of them once."""
+    name = effect["effect"]
+    alone = [*effect.get("group", ()), *(o for one in said.get("indistinguishable", ()) if name in one for o in one)]
+    found = [({name}, {other}) for other in alone if other != name]
+    found += [({*one["instead_of"]}, {*one["effects"]}) for one in effect.get("alternatives", ())]
+    return [one for k, one in enumerate(found) if one not in found[:k]]
 
 
 def _words(outside: Outside) -> set[str]:
