@@ -299,7 +299,9 @@ def _compile(
     )  # fmt: skip
 
 
-_SCRIPTS = (  # letters, what they are called, a font that has them, and its package
+_SCRIPTS: tuple[
+    tuple[Any, str, str, str], ...
+] = (  # letters, what they are called, a font that has them, and its package
     (re.compile("[\u3040-\u30ff]"), "Japanese", "IPAexGothic", "pip install 'cmm-uq[ja]'"),
     (re.compile("[\u1100-\u11ff\uac00-\ud7a3]"), "Korean", "Noto Sans CJK KR", "fonts-noto-cjk"),
     (re.compile("[\u2e80-\u9fff\uff00-\uffef]"), "Chinese", "Noto Sans CJK SC", "fonts-noto-cjk"),
@@ -310,17 +312,19 @@ _SCRIPTS = (  # letters, what they are called, a font that has them, and its pac
 )
 
 
-def _fonts_for(missing: Sequence[str]) -> tuple[str, str]:
+def fonts_for(missing: Sequence[str]) -> tuple[str, str]:
     """Names of fonts that have characters which no font here has, and the sentence that says what to install."""
     text = "".join(missing)
-    own = [one for one in _SCRIPTS if one[0].search(text)] or [(_TAG, "such", "Noto Sans", "fonts-noto")]
-    fonts = ", ".join(dict.fromkeys(font for *_, font, _ in own))
-    packages = ", ".join(dict.fromkeys(package for *_, package in own))
-    named = ", ".join(dict.fromkeys(script for _, script, *_ in own))
-    shown = f"{text[:_NAMED]}{' …' if len(text) > _NAMED else ''}"
+    own = [one for one in _SCRIPTS if one[0].search(text)]
+    shown = (
+        f"The PDF shows □ in place of {text[:_NAMED]}{' …' if len(text) > _NAMED else ''}: no font on this machine has "
+    )
+    if not own:
+        return "", f"{shown}it. The HTML view shows it in the reader's fonts."
+    scripts, fonts, packages = (", ".join(dict.fromkeys(one[k] for one in own)) for k in (1, 2, 3))
     return fonts, (
-        f"The PDF shows □ in place of {shown}: no font on this machine has {named} letters. Install {fonts} ({packages}), "
-        "and make it again; the HTML view shows them in the reader's fonts."
+        f"{shown}{scripts} letters. Install {fonts} ({packages}), and make it again; the HTML view shows them in the "
+        "reader's fonts."
     )
 
 
@@ -335,10 +339,10 @@ def _without(content: dict[str, Any], missing: list[str]) -> dict[str, Any]:
             return [shown(item) for item in value]
         return value.translate(table) if isinstance(value, str) else value
 
-    fonts, told = _fonts_for(missing)
+    fonts, told = fonts_for(missing)
     doc.NOT_LETTERED.set(told)
     codes = ", ".join(f"U+{ord(character):04X}" for character in missing)
-    return {**content, "document": shown(content["document"]), "missing": f"{codes} ({fonts})"}
+    return {**content, "document": shown(content["document"]), "missing": f"{codes} ({fonts})" if fonts else codes}
 
 
 WIDTH_MM, HEIGHT_MM = 84.0, 8.0

@@ -15,7 +15,7 @@ from pypdf import PdfReader
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.certificate.document import Column, Document, Plot, Section, Table
-from cmm_uq.certificate.render import HEIGHT_MM, WIDTH_MM, render_pdf, seal
+from cmm_uq.certificate.render import HEIGHT_MM, WIDTH_MM, fonts_for, render_pdf, seal
 from tests.certificate.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of, plots
 from tests.certificate.sign.authority import SIGNED, Held, curve_key, issued
 
@@ -183,6 +183,29 @@ def test_a_word_without_a_break_stays_on_the_page() -> None:
         )
     assert max(edges) < 595 - 56 + 1
     assert "".join("".join(pages(render_pdf(document_of(UNBREAKABLE), {}))).split()).count(UNBREAKABLE) > 10
+
+
+@pytest.mark.parametrize(
+    ("text", "fonts", "said"),
+    [
+        (
+            "三坐标",
+            "Noto Sans CJK SC",
+            "has Chinese letters. Install Noto Sans CJK SC (fonts-noto-cjk)",
+        ),
+        (
+            "測定さ",
+            "IPAexGothic, Noto Sans CJK SC",
+            "CJK SC (pip install 'cmm-uq[ja]', fonts-noto-cjk)",
+        ),
+        ("측정", "Noto Sans CJK KR", "in place of 측정: no font on this machine has Korean letters."),
+        ("\u0378", "", "no font on this machine has it."),
+    ],
+)
+def test_letters_that_no_font_has_are_told_with_the_font_to_install(text: str, fonts: str, said: str) -> None:
+    named, told = fonts_for(sorted({*text}) if text != "측정" else text)
+    assert named == fonts
+    assert said in told
 
 
 def test_a_character_that_no_font_has_is_shown_as_a_box_and_named() -> None:

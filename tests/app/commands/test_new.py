@@ -40,6 +40,7 @@ from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.identification import SIMULATED
 from tests.app.commands.test_budget import dated
+from tests.conftest import ROOT
 from tests.plugin.packages import OUTSIDE_KINDS, install
 from tests.result_keys import RESULTS, described
 
@@ -250,3 +251,19 @@ def test_from_python_it_is_a_job_in_memory(tmp_path: Path) -> None:
     job.write(tmp_path / "job")
     assert read_job(tmp_path / "job").origin == SIMULATED
     assert not beginning.check(beginning.new(PLAN)).sound
+
+
+RUNS = ROOT / "tests" / "jobs" / "importing" / "development_exports" / "D24_Z_before_comp.rtl"
+OF_RUNS = {"machine": {"name": "M"}, "recording": {"file": RUNS.name, "lines": {"Z": "along Z from 100,200,0"}}}
+
+
+def test_a_job_of_runs_along_one_axis_begins_with_effects_of_that_axis_alone() -> None:
+    tables = {**OF_RUNS, "job": {"date": dt.date(2025, 5, 8)}}
+    files = job_of_export("axis_runs", tables, {RUNS.name: RUNS.read_bytes()}, id="j")
+    assert tomllib.loads(files["job.toml"].decode())["model"]["effects"] == ["scale_z", "hysteresis_z"]
+
+
+def test_without_a_date_the_one_of_the_export_is_named() -> None:
+    with pytest.raises(CmmUqError, match="the file has it in line 18: Date: 14:06 May 08 2025") as refused:
+        job_of_export("axis_runs", OF_RUNS, {RUNS.name: RUNS.read_bytes()}, id="j")
+    assert refused.value.fix == "Give the date of measurement: --set job.date=2025-05-08"
