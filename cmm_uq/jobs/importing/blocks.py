@@ -27,9 +27,11 @@ _RULE = re.compile(r"[-=_*+|.\s]*")
 DATED = re.compile(r"\d{4}[./-]\d{1,2}[./-]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,4}|\d:\d\d|年")
 _PRINTED, _BRACKETS = re.compile(r"\d[.,]\d"), re.compile(r"\([^)]*\)")
 _FORMULA = re.compile(r"(?<=\S)(?<![XYZxyz])\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
+_LETTERED = re.compile(r"(?:\b[Xx] [Yy] [Zz]|\b[Ii] [Jj] [Kk])$")
 _SPREAD = re.compile(r"\d\s?[sσ]")  # above a column, and no figure
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 DEEPEST = 4  # rows of a head
+_ROLES = 2  # columns of a head that are called measured, nominal or deviations
 _TITLES = 3  # between a head and its figures, at most
 _SEVERAL = 3  # places in a row, more than a line has
 
@@ -132,6 +134,19 @@ class CutSheet:
         """Texts above a cell."""
         return self.block_of[row].paths[i] if row in self.block_of else []
 
+    def _names_line(self, row: int) -> bool:
+        """Whether a row begins what is said of a line, and is no direction below its start."""
+        text = self.line(row)
+        directed = places.role_among(self.text(row, 0)) == places.DIRECTION and places.says_figures(text)
+        return hint(text, lengths=True) == LINE and not directed
+
+    def lettered(self, i: int) -> bool:
+        """Whether a row has a letter of an axis a cell, then its figures: ``Start X | Y | Z | 140 | 120 | -640``."""
+        filled = [k for k, cell in enumerate(self.sheet.rows[i]) if cell != ""]
+        numbers = [k for k in filled if self.figures[i][k] is not None]
+        ahead = " ".join(self.text(i, k) for k in filled[:-3])
+        return numbers == filled[-3:] == [*range(3, 6)] and _LETTERED.search(ahead) is not None
+
     def _place_within(self, i: int, numbers: Sequence[int], beside: Sequence[Sequence[int]]) -> bool:
         """Whether figures of a row are of the place of a line, and no text of it alone says that."""
         if (len(numbers) not in (1, 2, 3, 6) and numbers in beside) or not self.place(i):
@@ -160,6 +175,8 @@ class CutSheet:
         near = [j for j in (i - 1, i + 1) if 0 <= j < len(self.figures)]
         beside = [[k for k, f in enumerate(self.figures[j]) if f is not None] for j in near]
         if not numbers or self._place_within(i, numbers, beside):
+            return "text"
+        if self.lettered(i):
             return "text"
         counted = len(filled) == 2 and numbers == filled[1:] and (self.figures[i][filled[1]] or (0, 0))[1] >= 1
         turned = numbers[0] > filled[0] and all(self._of_another(i, k) for k in numbers)
@@ -195,6 +212,7 @@ class CutSheet:
             if kind != "figures":
                 continue
             head = self._head(pending, [k for k, f in enumerate(self.figures[i]) if f is not None]) if pending else []
+            head = self._without_names(head, block)
             above, pending = [row for row in pending if row not in head], []
             for row in above:
                 titles = {**titles, **self._titles(row)}
@@ -209,13 +227,29 @@ class CutSheet:
             block.rows.append(i)
             block.titles[i] = titles
             if above:
-                lined = [k for k, row in enumerate(above) if hint(self.line(row), lengths=True) == LINE]
+                lined = [k for k, row in enumerate(above) if self._names_line(row)]
                 told = [self.line(row) for row in above[lined[-1] if lined else max(0, len(above) - DEEPEST) :]]
                 told = told if lined or any(hint(text, lengths=True) != RUN for text in told) else last
                 last = told
             self.above[i] = last
         if block is not None:
             yield block
+
+    def _without_names(self, head: list[int], block: Block | None) -> list[int]:
+        """A head without a row below it that names a feature, as ``Ball 1 | 9 points | outside``, and no column."""
+        above = head[:-1] or (block.head if block is not None else [])
+        named = sum(self._says_role(text) for row in above for text in self.sheet.rows[row])
+        cells = [str(cell) for cell in self.sheet.rows[head[-1]] if cell != ""] if head else []
+        first = bool(cells) and self.text(head[-1], 0) == cells[0] and any(map(str.isdigit, cells[0]))
+        if named < _ROLES or not first or len(cells) < 2 or not all(WORD.search(cell) for cell in cells):
+            return head
+        return head if any(self._says_role(cell) or unit_of([cell]) for cell in cells) else head[:-1]
+
+    @staticmethod
+    def _says_role(cell: formats.Cell) -> bool:
+        words = {*plain_words(str(cell))}
+        of = words_of("lengths")
+        return any(not words.isdisjoint(of[role]) for role in ("measured", "reference", "nominal", "deviation"))
 
     def _titled(self, blocks: list[Block]) -> list[Block]:
         """Blocks, upper rows of whose heads are titles, for they differ where the rows below them are the same."""

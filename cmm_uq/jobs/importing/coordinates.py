@@ -26,6 +26,8 @@ _MOST = 0.8  # of figures: where fewer are there, they may be of something else
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 _SAME = 2.0  # between what is nominal and what is measured; or a part of 0.002
 _EXACT = ("nominal", "reference", "target")
+_OF_LENGTHS = ("reference", "measured")
+_FINER = 50  # times, that lengths are printed finer than the places where they were measured
 _WIDE = 4.0  # of deviations and tolerances, in the unit of the file
 _PROBED = 8  # places on a circle
 _FEW = 3  # places, which may be round by chance
@@ -109,6 +111,7 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     lengths = [c for c in columns if c.may_be_length]
     named = _named(lengths, _levels(grid))
     triples, checked = _measured(_in_one_unit(named) or _bare(lengths), grid.at(min(rows, default=0)))
+    checked = checked or sum(_deviates_from(own, lengths) for own in triples)
     every = [c for own in triples for c in own.columns]
     if not triples or len({c.unit.name for c in every if c.unit}) > 1:
         return None
@@ -123,6 +126,10 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
     alone = not checked and sum(own.wide for own in named) == 1
     reading.beside_lengths = alone and bool(_COUNTED.sub("", triples[0].head).strip())
+    coarse = min(c.step for c in every)  # places as they were planned, at which lengths were measured
+    reading.beside_lengths |= any(
+        c.role in _OF_LENGTHS and c.step * _FINER <= coarse for c in lengths if c not in every
+    )
     reading.bare = [] if named else [c.i + 1 for c in every]
     reading.others = [*grid.ends]
     reading.taken = {f"{letter}_mm": [own.columns[k] for own in triples] for k, letter in enumerate("xyz")}
@@ -137,6 +144,16 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     for labels in reading.labels:
         labels |= {key: _LETTER.sub(" ", text).strip() or text for key, text in labels.items() if key[0] == "head"}
     return reading if _places(np.array(reading.figures).reshape(-1, 3)) else None
+
+
+def _deviates_from(of: Triple, columns: Sequence[FigureColumn]) -> bool:
+    """Whether two of its coordinates, as of holes in a plate, are nominal values and deviations beside them together."""
+    beside = [c for c in columns if c not in of.columns and c.step < 1]
+    found = [
+        any(d.role == "deviation" and d.values.any() and d.agrees(c, b, 1.0) for d, b in permutations(beside, 2))
+        for c in of.columns
+    ]
+    return sum(found) > 1
 
 
 def _between(column: FigureColumn, a: Triple, b: Triple) -> bool:

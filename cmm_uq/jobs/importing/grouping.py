@@ -19,6 +19,7 @@ from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.importing import factors
 from cmm_uq.jobs.importing.factors import LINE, POINT, RUN, Counted, Label, codes, counted, fixes, in_turn, together
 from cmm_uq.jobs.importing.format import NotReadError
+from cmm_uq.jobs.importing.header import plain_words, words_of
 from cmm_uq.jobs.importing.roles import said
 
 _SAME_PLACE_MM = 0.5
@@ -169,14 +170,24 @@ def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Flo
             rank = 0.0  # names begin again at places that were there
         elif several:
             rank = _rank(of, shape, named=bool(names), again=again[0] if again else None) if of else 0.0
+            if of and of[0].sort in ("title", "sheet") and not rank and at.max() == place.max():
+                rank = _MOVED * all(_on_a_ball(xyz[first][own == one]) for one in range(int(own.max()) + 1))
             if of and of[0].sort == "turn":
                 rank = 0.0 if _a_chain(xyz[first]) else min(rank, _AT_LEAST) if each < _SEVERAL else rank
         else:
-            rank = _NAMED if names or _on_a_ball(xyz[first]) else 0.0
+            rank = _NAMED if names or _on_a_ball(xyz[first]) or _each_again(found, place) else 0.0
         told.append(Grouping(rank, of, measurement, at, point))
         if names:
             return told[-1]
     return next(iter(told), None)
+
+
+def _each_again(found: Sequence[Counted], place: Ints) -> bool:
+    """Whether a word counts measurements, in each of which every place comes once, so that its order names it."""
+    every, called = int(place.max()) + 1, words_of("columns")["measurement"]
+    words = (f for f in found if not called.isdisjoint(plain_words(f[0].words)) or counted(f[0], lengths=True) == RUN)
+    runs = (f[1] for f in words if every > _SEVERAL and factors.counting(f[0].values))
+    return any(together(place, own).max() + 1 == every * (own.max() + 1) == len(place) for own in runs)
 
 
 def _rank(of: Counted, shape: str, *, named: bool, again: Counted | None) -> float:

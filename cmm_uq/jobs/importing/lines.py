@@ -47,6 +47,7 @@ from cmm_uq.jobs.importing.format import (
     length_named,
 )
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
+from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
 from cmm_uq.jobs.importing.lengths.placing import place_of_axis
 from cmm_uq.jobs.importing.reports import TextReport
 from cmm_uq.jobs.importing.roles import SheetReading
@@ -328,7 +329,10 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
         fix = "Write it above them: (µm) or (mm)"
         raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
     target = units.converted(figures[:, 0], unit, "x_mm")
-    deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um")
+    turn = not (reading.positions or reading.checked) and turned_by(
+        sheets, (c.heading for c in reading.taken["reading_um"]), where, targets=True
+    )
+    deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um") * (-1 if turn else 1)
     named = [
         [find(value) or find(f"{label.words} {value}") for value in label.values]
         for find in (axis_in, _letter_in)

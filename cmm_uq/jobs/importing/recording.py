@@ -21,6 +21,7 @@ from cmm_uq.jobs.importing.answers import head_of
 from cmm_uq.jobs.importing.cells.encodings import is_number
 from cmm_uq.jobs.importing.cells.figures import SMALL
 from cmm_uq.jobs.importing.columns import columns_of
+from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import Fact, Format, ImportKeys, NotReadError, Recognition, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, axis_runs, placed, placed_runs
@@ -111,6 +112,9 @@ def _imported(
             map(heads.names_axes, sheet.rows[header.first + 1 :])
         ):
             raise NotReadError("its head comes again", where=sheet.at(where, header.row), fix="Export one table")
+        if not keys.columns and wanted is POINTS and _lengths_at_places(sheet, header):
+            what = "its rows are lengths, measured at planned places"
+            raise NotReadError(what, where=sheet.at(where, header.row), fix="Name columns")
         if (
             not keys.columns
             and len(header.columns.get("x_mm", ())) == 2
@@ -127,6 +131,19 @@ def _imported(
         if understood is not None:
             return _understood(understood, keys, where, reach_mm, recognised)
     raise problem or heads.no_header(sheets, keys, where, wanted)
+
+
+def _lengths_at_places(sheet: Sheet, header: Header) -> bool:
+    """Whether calibrated and measured lengths stand beside coordinates, and are printed a hundred times finer than those."""
+    row = sheet.rows[header.first] if header.first < len(sheet.rows) else ()
+    digits = [
+        len(re.split("[.,]", heads.text_of(cell))[-1]) if re.search(r"\d[.,]\d", heads.text_of(cell)) else 0
+        for cell in row
+    ]
+    places = [digits[own[0]] for name, own in header.columns.items() if name in COORDINATES and own[0] < len(row)]
+    fine = [i for i in range(min(len(row), len(header.headings))) if places and digits[i] >= max(places) + 2]
+    roles = {said(header.headings[i]) or hint(header.headings[i], lengths=True) for i in fine}
+    return not roles.isdisjoint({"reference", "nominal"}) and not roles.isdisjoint({"measured", "run"})
 
 
 def _understood(

@@ -17,6 +17,7 @@ from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.importing.cells.encodings import head_text, report_lines
 from cmm_uq.jobs.importing.format import Cell, Fact, Format, ImportKeys, NotReadError, Row, Sheet, sheets_of
+from cmm_uq.jobs.importing.lengths.dmis_distances import distances_in
 
 AXES = ("X", "Y", "Z")
 WITH_DIRECTION = ["name", "x", "y", "z", "i", "j", "k"]
@@ -185,12 +186,14 @@ class Dmis(TextReport):
                 row = _feature(match, line, where)
                 rows += [row] if row else []
                 others += row is None
+        encoded = facts_of(encoding, "features_not_used", say("Features that are no place"), others)
+        if not rows and (found := distances_in(statements(lines, where), unit, encoded, where)):
+            return found
         if not rows:
             counted = f"{others} actual features, none of them a sphere, point or circle"
             raise CmmUqError(f"holds {counted if others else 'no actual feature'} (FA)", where=where,
                              fix="Put the spheres or points out: OUTPUT/FA(…)")  # fmt: skip
-        facts = facts_of(encoding, "features_not_used", say("Features that are no place"), others)
-        return without_results(sheets_of(rows, WITH_DIRECTION, unit=unit, decimal=".", facts=facts))
+        return without_results(sheets_of(rows, WITH_DIRECTION, unit=unit, decimal=".", facts=encoded))
 
 
 def statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:

@@ -197,7 +197,14 @@ class SheetReading:
         called = {c.i: grid.named(c.i, c.path) or understood(c.heading).column or "" for c in columns}
         for c in columns:
             name, sort = called[c.i], sort_of(called[c.i])
-            if c.i not in used and name in _FURTHER and c.full and not (sort and c.unit and sort[0] != c.unit.sort):
+            way = self.kind == "lengths" and name in ("nx", "ny", "nz")  # of the line, and no normal of a surface
+            if (
+                c.i not in used
+                and name in _FURTHER
+                and c.full
+                and not way
+                and not (sort and c.unit and sort[0] != c.unit.sort)
+            ):
                 self.further[name] = converted(c.values, c.unit, name) if c.unit and sort else c.values
         self.beside = _beside(grid, rows, used | {c.i for c in columns if c.role == "deviation" and c.minute})
         names = ((c.i, c.heading) for c in columns if called[c.i] not in self.further)

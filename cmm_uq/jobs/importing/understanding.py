@@ -28,6 +28,7 @@ from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import on_a_plate, places
 from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary, shown
+from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
 from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of, take_certified
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
@@ -352,7 +353,8 @@ class Understanding:
                 bare = own.taken["deviation_um"]
                 what = f"nothing says the unit of {bare[0].heading!r}: µm or mm"
                 raise NotReadError(what, where=place, fix=said_by("deviation_um", bare, ", or deviation_mm"))
-            measured = reference + formats.converted(figures[:, 1], small, "length_mm")
+            turn = turned_by(self.sheets, (c.heading for c in own.taken["deviation_um"]), place)
+            measured = reference + formats.converted(figures[:, 1], small, "length_mm") * (-1 if turn else 1)
         stated = [one["place", ""] for one in own.labels]
         places = stated_places(lines, stated, self.elsewhere, measured.tolist(), unit.up / unit.down, self.grid.sign)
         bare_ = [None if np.isnan(one) else float(one) for one in reference]

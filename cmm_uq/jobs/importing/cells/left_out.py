@@ -35,6 +35,9 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
     known = frozenset().union(*(words_of("rows")[table] for table in tables))
     texts = (cell for cell in row if isinstance(cell, str) and not (len(cell) == 1 and cell.isascii()))  # as O, for oui
     words = [*map(plain_words, texts)]
+    if "feature" in tables:  # as ``Flatness 2``, unless lines are called so
+        formed = {one for one in known - words_of("lengths")["line"] if len(one) > len("rad") or not one.isascii()}
+        words += [own[:-1] for own in words if len(own) > 1 and own[-1].isdigit() and " ".join(own[:-1]) in formed]
     void = words_of("rows")["void"] - words_of("lengths")["run"] if "void" in tables else frozenset[str]()
     return any(" ".join(own) in known or (len(own) > 1 and own[0] in void) for own in words)  # as ``VOID - air alarm``
 
@@ -61,7 +64,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     for row in range(len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and first <= row < last and row not in heads:
             own = [grid.figure(row, k) for k in columns]
-            if None not in own and any(f is not None and f[1] < 1 for f in own):
+            if None not in own and any(f is not None and f[1] < 1 for f in own) and not grid.lettered(row):
                 return None  # whatever else stands in it, it may be measured
             text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
             if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
@@ -87,7 +90,7 @@ def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[in
     cells, block = grid.sheet.rows[row], grid.block_of[row].rows
     if header.is_summary(cells) or is_void(cells, "void", "feature"):
         return True
-    if row in below_deviations(grid, [row, *rows]):
+    if row in below_deviations(grid, [row, *rows]) or _of_preamble(grid, row, rows, columns):
         return True
     if said(*(grid.text(row, k) for k in range(len(cells)) if k not in figures)) == "summary":
         return True
@@ -106,6 +109,24 @@ def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[in
         if not any(abs(value - one) <= 1.05 * step for one in sums):
             return False
     return True
+
+
+def _of_preamble(grid: CutSheet, row: int, rows: Collection[int], columns: Collection[int]) -> bool:
+    """Whether a row of words and figures is of what stands above a table.
+
+    None of its kind is read, and all that are have figures where it has its word, or numbers in their names.
+    """
+    first = next((k for k in range(grid.width) if grid.text(row, k)), 0)
+    word = grid.figures[row][first] is None
+    if word and first in columns and sum(f is not None for f in grid.figures[row]) < 2 <= len(columns):
+        return True  # a result with its name, in place of one of several coordinates
+    if not word or not {*grid.block_of[row].rows}.isdisjoint(rows):
+        return False
+    names = [(grid.text(r, first), grid.figure(r, first)) for r in rows]
+    numbered = not any(map(str.isdigit, grid.text(row, first))) and all(
+        any(map(str.isdigit, name)) for name, _ in names
+    )
+    return numbered or all(f is not None for _, f in names)
 
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+")

@@ -36,6 +36,7 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     for k, (label, own, _) in enumerate(found if {"title", "column"} & of_lines else ()):
         if label.sort == "head" and counting(label.values) and ("title" in of_lines or label.values[0][1:2].isdigit()):
             found[k] = label, own, RUN  # M1, M2 are measurements of the line that is named
+    found = [(f[0], f[1], RUN if _measurements(f, found) else f[2]) for f in found]
     found = [(f[0], f[1], LINE if f[2] is None and _says_places(f[0]) else f[2]) for f in found]
     above = [f for f in found if f[0].sort in ("title", "sheet", "block") and not fixes(f[1], reference)]
     # numbers of the lengths of each line, though they are called positions
@@ -64,6 +65,13 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     numbers = factors.in_turn(key) if run is None else factors.numbered_runs(run[0].values)
     used = [f[0].words for f in (*line, *([run] if run else []))]
     return names or [titled[-1] if titled else "1"] * count, numbers, used
+
+
+def _measurements(one: Counted, others: Sequence[Counted]) -> bool:
+    """Whether parts of names such as M1 and M2 count measurements, for something else that crosses them names the lines."""
+    numbered = one[0].sort == "part" and all(value[:1] in "mM" and value[1:].isdigit() for value in one[0].values)
+    lines = (f[1] for f in others if numbered and f[2] == LINE and len(f[0].values[0]) > len("M1"))
+    return any(not fixes(own, one[1]) and not fixes(one[1], own) for own in lines)
 
 
 def _says_places(label: Label) -> bool:
@@ -113,6 +121,17 @@ def _told_apart(
             continue
         if one[0].sort == "part" and line and run is None and {*one[0].values} <= {*"abcdefgh"}:
             raise NotReadError("letters in names may be of runs or lines", where=place, fix="Number runs in a column")
+        if (
+            one[0].sort == "part"
+            and line
+            and run is None
+            and one[2] is None
+            and not _digits(one[0])
+            and _crossed(one, line)
+        ):
+            what = f"{one[0].values[0]!r} in names may count runs, or lines"
+            fix = 'Say so with a word for a run ahead of each number, as in "Run 1"'
+            raise NotReadError(what, where=place, fix=fix)
         whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
         unsaid = any(f[2] is None for f in line) and one[2] is None and one[0].sort == "column"
         if run is None and (named or lined) and _digits(one[0]):
@@ -128,6 +147,13 @@ def _told_apart(
             fix = f'Say by which column: columns = {{ line = "{one[0].words}" }}'
             raise NotReadError("nothing says which lengths lie on one line", where=place, fix=fix)
     return line, run
+
+
+def _crossed(one: Counted, lines: Sequence[Counted]) -> bool:
+    """Whether labels that are alike but for their number come again on all lines."""
+    key = factors.together(*(f[1] for f in lines))
+    pairs = int(factors.together(key, one[1]).max()) + 1
+    return counting(one[0].values) and pairs == (int(key.max()) + 1) * (int(one[1].max()) + 1)
 
 
 def _one_run(labels: Sequence[Label], runs: Sequence[Counted], place: str) -> Counted | None:

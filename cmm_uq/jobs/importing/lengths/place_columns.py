@@ -13,8 +13,9 @@ from cmm_uq.jobs.importing.lengths import places
 if TYPE_CHECKING:
     from cmm_uq.jobs.importing.blocks import Block, CutSheet
 
-_AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012]?(?![^\W_]))", re.IGNORECASE)
-_ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?0(?!\w)")
+_AXIS_LETTER = re.compile(r"(?<![^\W_])[XYZ](?=[012AB]?(?![^\W_]))", re.IGNORECASE)
+_ORIGIN = re.compile(r"(?<![^\W_])[XYZ]_?(?:0|A)(?!\w)")  # of the first end, or of ball A
+_UNIT_VECTOR = 2e-3
 _MEASURED = 0.05  # figures printed finer are no planned places
 FINER = 50  # times, that lengths are printed finer than the places where they were measured
 
@@ -25,6 +26,7 @@ def place_columns(grid: CutSheet, block: Block) -> dict[str, list[int]]:
     columns: dict[str, list[int]] = {}
     for i, text in heads:
         columns.setdefault(places.START if _ORIGIN.search(text) else places.role_among(text), []).append(i)
+    columns[places.DIRECTION] = columns.get(places.DIRECTION) or _directions(grid, block, [i for i, _ in heads])
     by_words = {of: own for of, own in columns.items() if of and len(own) == (1 if of in places.ANGLES else 3)}
     if {places.START, places.CENTRE} & {*by_words} and len(by_words) > 1:
         _touches(grid, block, by_words)
@@ -48,6 +50,20 @@ def place_columns(grid: CutSheet, block: Block) -> dict[str, list[int]]:
     # finer ones are measured balls, unless lengths beside them are much finer still, or one was computed from them
     fit = others and (step >= _MEASURED or fine * FINER <= step or (len(others) > 1 and _touches(grid, block, found)))
     return found if fit else by_words
+
+
+def _directions(grid: CutSheet, block: Block, columns: Sequence[int]) -> list[int]:
+    """Three columns side by side, beside which others stand, with directions of the length 1 in each row."""
+    for i in columns if len(columns) > len("XYZijk") else ():
+        three = np.column_stack([grid.column(block.rows, k)[0] for k in range(i, min(i + 3, grid.width))])
+        three = three[np.isfinite(three).any(axis=1)]
+        if (
+            three.shape[1:] == (3,)
+            and len(three)
+            and bool((np.abs(np.linalg.norm(three, axis=1) - 1) < _UNIT_VECTOR).all())
+        ):
+            return [i, i + 1, i + 2]
+    return []
 
 
 def _touches(grid: CutSheet, block: Block, columns: Mapping[str, Sequence[int]]) -> bool:

@@ -39,7 +39,7 @@ _NAMED = (
     re.compile(rf"\bi\s*[=:]\s*({_PLAIN})\W{{1,3}}j\s*[=:]\s*({_PLAIN})\W{{1,3}}k\s*[=:]\s*({_PLAIN})", re.I),
     re.compile(rf"\bX({_PLAIN})[ ,;/]{{1,3}}Y({_PLAIN})[ ,;/]{{1,3}}Z({_PLAIN})(?!\w)"),
 )
-_ALL_AXES = re.compile(r"X\W{0,3}Y\W{0,3}Z\W{0,3}(?:\([^)\d]*\))?\W{0,5}$", re.I)
+_ALL_AXES = re.compile(r"(?:X\W{0,3}Y\W{0,3}Z|\bI\W{1,3}J\W{1,3}K)\W{0,3}(?:\([^)\d]*\))?\W{0,5}$", re.I)
 _AXIS = re.compile(r"(?<![A-Za-z])([+-]?)([XYZ]+)(?![A-Za-z\d]|\s*[=:]?\s*[+-]?\d)")
 _ARROW = re.compile(r"(?:→|->|=>|~|–|—|\.\.)\s*$")
 _FAR, _FAR_UNSAID = 3.0, 1.5  # of the longest length: farther are no ends of it, said to be so or not

@@ -36,6 +36,7 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
     beside = [c for c in columns if c is not target and c.role in (None, "deviation", "measured")]
     ways = _ways(beside)
     small = [c for c in beside if (c.step < 1 or ways[c.i]) and not like(c.values + 1000, values + 1000)]
+    small = [c for c in small if not _limit(c, small, filled)]
     small = [c for c in without_derived(small) if ways[c.i] or not follows(c, filled)]
     directed = [c for c in small if ways[c.i]] or [c for c in small if c.role == "deviation"]
     source = directed or small  # the others are reversals, spreads and what was recorded beside them
@@ -59,6 +60,15 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
             else:
                 reading.blank.append((row, c.i))
     return reading if senses(reading.every_label, [one[0] for one in reading.figures]) is not None else None
+
+
+def _limit(column: FigureColumn, others: Sequence[FigureColumn], target: FigureColumn) -> bool:
+    """Whether a column is a limit, as ``Plus`` and ``Minus``: the same in all rows, or as the one for the other sense."""
+    own = column.values[np.isfinite(column.values)]
+    if len(own) > _FEWEST and own[0] and not np.ptp(own):
+        return True
+    twin = any(o is not column and np.array_equal(np.abs(o.values), np.abs(column.values)) for o in others)
+    return twin and bool(own.any()) and follows(replace(column, values=np.abs(column.values)), target)
 
 
 def _ways(columns: Sequence[FigureColumn]) -> dict[int, int]:

@@ -1,0 +1,40 @@
+"""Distances of a DMIS output: nominal ``T(D1)=TOL/DISTB,NOMINL,100,…``, measured ``TA(D1)=TOL/DISTB,100.0004,…``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from cmm_uq.base.files.csv_table import number_problem
+from cmm_uq.jobs.importing.format import Cell, Fact, NotReadError, Sheet
+
+_TOLERANCE = re.compile(r"^T(?P<actual>A)?\s*\((?P<name>[^)]*)\)\s*=\s*TOL\s*/\s*DISTB\s*,(?P<rest>.*)$", re.IGNORECASE)
+_TEXT = re.compile(r"^TEXT\s*/\s*OUTFIL\s*,\s*'(?P<text>[^']*)'", re.IGNORECASE)
+
+
+def distances_in(
+    statements: Iterable[tuple[int, str]], unit: str | None, facts: tuple[Fact, ...], where: str
+) -> list[Sheet]:
+    """A sheet of nominal and measured distances below the texts that stand ahead of them; none where there are none."""
+    rows: list[list[Cell]] = [["name", "nominal", "measured"]]
+    lines, nominal, count = [0], dict[str, str](), 0
+    for line, statement in statements:
+        if (text := _TEXT.match(statement)) and text["text"].strip():
+            rows.append([text["text"].strip()])
+            lines.append(line)
+        if (match := _TOLERANCE.match(statement)) is None:
+            continue
+        words = [word.strip() for word in match["rest"].split(",")]
+        figures = [word for word in words if not word[:1].isalpha()]
+        if not figures or number_problem(figures[0]):
+            raise NotReadError("has no figure", where=f"{where} line {line}", fix="Export it again")
+        if not match["actual"]:
+            nominal |= {match["name"]: figures[0]} if words[0].upper() == "NOMINL" else {}
+            continue
+        if match["name"] not in nominal:
+            what = f"TA({match['name']}) has no nominal distance: T({match['name']})=TOL/DISTB,NOMINL,…"
+            raise NotReadError(what, where=f"{where} line {line}", fix="Put the tolerances out with what is measured")
+        rows.append([match["name"], nominal.pop(match["name"]), figures[0]])
+        lines.append(line)
+        count += 1
+    return [Sheet("", rows, lines, unit=unit, decimal=".", facts=facts)] if count else []
