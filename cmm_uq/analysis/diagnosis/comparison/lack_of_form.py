@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,24 +17,27 @@ _SIZES = np.geomspace(0.4, 12.0, 5)  # rms of a function of many coefficients ov
 _FITTED = 2  # coefficients up to which a function takes what fits best
 _SHOWS = 0.4  # rms over the noise that the largest must reach
 _UNABSORBED = 1e-5  # part of its length that the baseline leaves
-_BEGIN, _OPEN, _FURTHER = 100, 0.1, 400  # draws; probability from which on they are enough; draws more
+_BEGIN, _OPEN, _FURTHER = 50, 0.1, 400  # draws; probability from which on they are enough; draws more
 _NUMBERS = 400_000  # of a block of columns
 
 
-def lack_of_form(comparison: CandidateComparison, families: Sequence[FunctionFamily], seed: int, alpha: float) -> float:
+def lack_of_form(
+    comparison: CandidateComparison, families: Callable[[], Iterable[FunctionFamily]], seed: int, alpha: float
+) -> float:
     """Probability, under nothing, of as much evidence for a function of closed form, or a rough one.
 
-    Noise is of any kind but heavy tails; what is drawn has these too.
+    Noise is of any kind but heavy tails; what is drawn has these too. ``families``: called for them, once or twice; what
+    is common to their log priors does not matter.
     """
-    if not families or comparison.degrees_of_freedom < 2:
+    if comparison.degrees_of_freedom < 2:
         return 1.0
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(19,)))
     normal = comparison.only([k for k, kind in enumerate(comparison.kinds) if kind.name != "tails"])
     data = np.column_stack([comparison.left, draw_nothing(comparison, random, _BEGIN)])
-    value, *draws = _log_odds(normal, families, data).tolist()
+    value, *draws = _log_odds(normal, families(), data).tolist()
     p_value = tail_probability(np.array(draws), value)
     if p_value < _OPEN and not is_clear(p_value, alpha, (1 - TAIL) * _BEGIN):
-        draws += _log_odds(normal, families, draw_nothing(comparison, random, _FURTHER)).tolist()
+        draws += _log_odds(normal, families(), draw_nothing(comparison, random, _FURTHER)).tolist()
         p_value = tail_probability(np.array(draws), value)
     return p_value
 
@@ -46,14 +49,14 @@ def likeliest_noise(comparison: CandidateComparison, families: Sequence[Function
     return normal[int(np.logaddexp(_of_forms(own, families, left), own.of_nothing(left)).argmax())]
 
 
-def _log_odds(comparison: CandidateComparison, families: Sequence[FunctionFamily], data: Floats) -> Floats:
+def _log_odds(comparison: CandidateComparison, families: Iterable[FunctionFamily], data: Floats) -> Floats:
     """Log odds (b,) of any function over nothing for data (m, b)."""
     return np.asarray(
         np.logaddexp.reduce(_of_forms(comparison, families, data)) - log_sum(comparison.of_nothing(data), 0)
     )
 
 
-def _of_forms(comparison: CandidateComparison, families: Sequence[FunctionFamily], data: Floats) -> Floats:
+def _of_forms(comparison: CandidateComparison, families: Iterable[FunctionFamily], data: Floats) -> Floats:
     """Log evidence (k, b) of functions, by kind of noise, for data (m, b), the size of few coefficients at its likeliest."""
     degrees, found = comparison.degrees_of_freedom, np.full((len(comparison.kinds), data.shape[1]), -np.inf)
     totals = [np.einsum("mb,mb->b", data, noise(data)) for noise in comparison.precisions]
@@ -75,17 +78,15 @@ def _of_forms(comparison: CandidateComparison, families: Sequence[FunctionFamily
     return found
 
 
-def _blocks(families: Sequence[FunctionFamily]) -> Iterator[tuple[Floats, Floats]]:
+def _blocks(families: Iterable[FunctionFamily]) -> Iterator[tuple[Floats, Floats]]:
     """Functions (m, K, r) of as many coefficients, and the log prior of each (K,), so many at once as a block may hold."""
-    for r in sorted({family.columns.shape[2] for family in families}):
-        some, size = list[FunctionFamily](), 0
-        for family in [each for each in families if each.columns.shape[2] == r]:
-            if some and size + family.columns.size > _NUMBERS:
-                yield _joined(some)
-                some, size = [], 0
-            some.append(family)
-            size += family.columns.size
-        yield _joined(some)
+    waiting: dict[int, list[FunctionFamily]] = {}
+    for family in families:
+        some = waiting.setdefault(family.columns.shape[2], [])
+        some.append(family)
+        if sum(each.columns.size for each in some) > _NUMBERS:
+            yield _joined(waiting.pop(family.columns.shape[2]))
+    yield from map(_joined, waiting.values())
 
 
 def _joined(some: Sequence[FunctionFamily]) -> tuple[Floats, Floats]:

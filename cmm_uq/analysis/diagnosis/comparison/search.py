@@ -15,7 +15,7 @@ from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
 from cmm_uq.analysis.diagnosis.comparison.lack_of_form import lack_of_form
-from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, families_of
+from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, each_family, families_of
 from cmm_uq.analysis.diagnosis.noise import noise_kinds, sigma_grid
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -101,7 +101,8 @@ def search(model: RecordingModel, stated: float | None, *, alpha: float, seed: i
 def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int) -> SearchResult:
     first = model_comparison(model, stated, seed, alpha)
     if first.p_value >= alpha:  # what no effect is, and no smooth function, may have a form
-        of_forms = lack_of_form(first.comparison, first.families, seed, _OF_FORMS * alpha) / _OF_FORMS
+        about = first.model, first.values, first.comparison
+        of_forms = lack_of_form(first.comparison, lambda: each_family(*about), seed, _OF_FORMS * alpha) / _OF_FORMS
         first = replace(first, p_value=of_forms) if of_forms < alpha else first
     if first.p_value >= alpha:
         return SearchResult(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)

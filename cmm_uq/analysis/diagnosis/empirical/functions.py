@@ -202,11 +202,16 @@ class FunctionFamily:
 
 def families_of(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> list[FunctionFamily]:
     """All functions of a recording, each term as probable as another; about values (k,) of the model's unknowns."""
-    each = (_of_points, _of_approach, _of_observations)
-    found = [family for of in each for family in of(model, values, comparison)]
+    found = list(each_family(model, values, comparison))
     terms = len({family.term for family in found})
     seen = (family for family in found if np.linalg.norm(family.columns, axis=(0, 2)).max() > _SEEN)
     return [replace(family, log_prior=family.log_prior - float(np.log(terms))) for family in seen]
+
+
+def each_family(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
+    """One after the other, with the log prior of each within its term: all of many observations fill a memory."""
+    for of in (_of_points, _of_approach, _of_observations):
+        yield from of(model, values, comparison)
 
 
 def _of_form(term: FunctionTerm, form: ClosedForm, seen: Seen, covariate: Floats, log_prior: float) -> FunctionFamily:
