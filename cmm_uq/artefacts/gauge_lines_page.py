@@ -12,7 +12,7 @@ from cmm_uq.artefacts.gauge_lines import StepGauge
 from cmm_uq.base.messages import NOTHING, Text, listed, number, say, semicolons, sentences
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.base.values import dataclass, replace
+from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table, figure_columns, section, table
 from cmm_uq.certificate.plots.residuals import deviations_plot, residual_volume
 from cmm_uq.certificate.result import Page, Result
@@ -147,7 +147,7 @@ def _stated_data(value: float, stated: Stated) -> dict[str, float]:
 
 def figures(result: Result) -> tuple[LineFigures, ...]:
     gauge, sizes = cast("StepGauge", result.artefact), result.posterior.sizes
-    every = replace(result.model, used=np.ones_like(result.model.used))
+    every = result.model.using()
     components, sizes = noise_of(every), sizes.at(evenly(len(sizes.placing), _DRAWS))
     size, machine = gauge.sizes[0], gauge.points.machine
     relative = size.sd / size.nominal if size.certified else 0.0

@@ -20,7 +20,7 @@ from cmm_uq.analysis.screening.screening import counted_with
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PRINTED, Unit
-from cmm_uq.base.values import dataclass, replace
+from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
@@ -168,7 +168,7 @@ def costs(
 
 
 def _noise(diagnosis: Diagnosis) -> Components:
-    return noise_of(replace(diagnosis.after, used=np.ones_like(diagnosis.after.used)))
+    return noise_of(diagnosis.after.using())
 
 
 def _depends(job: Job, diagnosis: Diagnosis) -> bool:
@@ -199,7 +199,7 @@ class _Correction:
         cls, fitted: RecordingModel, found: Collection[str], value: Floats, drawn: _Drawn, observe: Observed
     ) -> _Correction:
         """For the effects of these names, by what a model estimates of them (k,)."""
-        model = replace(fitted, used=np.ones_like(fitted.used))
+        model = fitted.using()
         artefact = model.artefact
         ours = np.array([unknown.key[0] in found for unknown in model.unknowns], dtype=bool)
         coefficients = np.where(ours, value, 0.0)[: len(value) - len(artefact.sizes)]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.conformity import decided, own_rule
 from cmm_uq.analysis.conformity.as_recorded import repeats_of_gauge, supplemented
 from cmm_uq.analysis.conformity.own_rule import figure_of, form_unstated
-from cmm_uq.analysis.conformity.plan_conditions import apart, most_apart, nominals, sphere_points
+from cmm_uq.analysis.conformity.plan_conditions import most_apart, neighbours, nominals, sphere_points
 from cmm_uq.analysis.conformity.plans import ISO_10360_2, Condition, SpherePlan
 from cmm_uq.analysis.conformity.standard import (
     NOT_STATED,
@@ -230,8 +230,7 @@ def bars(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
             which = next((i for i, (low, high) in enumerate((SHORT, LONG)) if low <= length / reach <= high), None)
             if which is not None and not (recorded and int(points.group[rows[0]]) in points.copies):
                 ends[int(points.measurement[rows[0]])] = points.xyz[rows], which
-    near = {i: {j for j in ends if j != i and apart(ends[i][0], ends[j][0]) < 10.0} for i in ends}
-    taken = most_apart(near)
+    taken = most_apart(neighbours({i: bar for i, (bar, _) in ends.items()}, 10.0))
     counts = [sum(ends[i][1] == which for i in taken) for which in (0, 1)]
     return (
         asked(say("{count} positions of the bars", count=BARS), BARS, len(taken)),

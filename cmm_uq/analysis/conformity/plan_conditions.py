@@ -255,7 +255,7 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     same: dict[int, tuple[float | None, int]] = {later: (None, one) for later, one in pairs if later != one}
     copied = set(same)
     left = [i for i, own in enumerate(numbers) if own not in copied]
-    near = {i: {j for j in left if j != i and apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
+    near = neighbours({i: ends[i] for i in left}, plan.apart_mm)
     chosen = most_apart(near)
     same |= {numbers[i]: (plan.apart_mm, numbers[min(near[i] & chosen)]) for i in left if i not in chosen}
     count, missing = sum(number not in same for number in numbers), list[Text]()
@@ -336,9 +336,11 @@ def _listed(numbers: Sequence[int]) -> Text:
     return commas(words)
 
 
-def apart(one: Floats, two: Floats) -> float:
-    """Larger distance of the ends (2, 3) of two bars, whichever way round they lie, mm."""
-    return float(min(np.linalg.norm(one - turned, axis=1).max() for turned in (two, two[::-1])))
+def neighbours(ends: Mapping[int, Floats], within_mm: float) -> dict[int, set[int]]:
+    """Of bars, with the ends (2, 3) of each, mm, those others whose ends are all nearer, whichever way round they lie."""
+    numbers, ways = np.array(list(ends)), np.array([(bar, bar[::-1]) for bar in ends.values()])
+    apart = ((i, np.linalg.norm(own - ways, axis=3).max(axis=2).min(axis=1)) for i, own in ends.items())
+    return {i: {*numbers[far < within_mm].tolist()} - {i} for i, far in apart}
 
 
 def sphere_points(

@@ -340,7 +340,7 @@ def noise_kinds(model: RecordingModel, candidates: Sequence[Explanation]) -> lis
     none = np.zeros((len(residuals), 0))
     rivals = [none, *(e.members[0].columns for e, twice in zip(effects, doubled, strict=True) if not twice)]
     # without a degree of freedom the recording says nothing of its noise, and what is stated holds
-    components = noise_of(replace(model, sigma=None) if fitted.degrees_of_freedom else model)
+    components = noise_of(model if model.sigma is None or not fitted.degrees_of_freedom else replace(model, sigma=None))
     left, jumps = linear.reduce(residuals[:, None])[:, 0], [none]
     for function in [each for each in candidates if each.kind == UNKNOWN and each.covariate_name == "time_s"]:
         if steps := [member.columns for member in function.members if member.columns.shape[1] == 1]:

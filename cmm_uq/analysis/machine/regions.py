@@ -18,7 +18,6 @@ What is stated of a machine's axes: how each is read, in place of what physics a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -203,7 +202,7 @@ class DrawnErrors:
         acting, k, own = model.about(about), own.shape[1], own - about[: own.shape[1]]
         if (lengths := artefact.lengths()) is not None and not np.array_equal(artefact.lines_of(rows)[1], steps):
             # between other places than the readings', as of balls that were scanned: by what the artefact makes of errors
-            every, sizes = replace(model, used=np.ones_like(model.used)), [one.nominal for one in artefact.sizes]
+            every, sizes = model.using(), [one.nominal for one in artefact.sizes]
             shown = lengths - sizes[0] - artefact.size_change() @ (about[k:] - sizes) - every.residuals(about)
             columns = np.hstack([shown_by(every, one) for one in (*model.effects, *self.field.effects)])
             return np.asarray(shown + own @ columns[:, :k].T + further @ columns[:, k:].T)
@@ -259,26 +258,21 @@ def factor_regions(
 
     named, placed = columns_of(model.effects, _of_place), columns_of(field.effects, lambda one: not one.columns)
     acting = _chosen(model.effects, named), _chosen(field.effects, placed)
-    whole, *eighths = (_moved(model.artefact.points.machine, *acting, ends) for ends in (((0.0, 1.0),) * 3, *EIGHTHS))
-    same = np.logical_and.reduce([np.all(np.isfinite(one), axis=1) for one in (whole, *eighths)])
-    named = named[same]
+    moved = _moved(model.artefact.points.machine, *acting, (((0.0, 1.0),) * 3, *EIGHTHS))
+    same = np.isfinite(moved).all(axis=(0, 2))
+    named, moved = named[same], moved[:, same]
     keys = [model.unknowns[i].key for i in named]
     units = [model.unknowns[i].unit for i in named]
 
     ours, others = own[:, named], further[:, placed]
-
-    def within(change: Floats) -> Floats:
-        return np.asarray(ours + others @ change[same].T)
-
     of_recording = drawn.of_recording(model, posterior)
-    doubted = partial(drawn.doubted, model, named)
-    over_all, parts = doubted(within(whole)), np.stack([doubted(within(one)) for one in eighths])
-    low, high = np.quantile(parts.min(axis=0), 0.025, axis=0), np.quantile(parts.max(axis=0), 0.975, axis=0)
+    over_all, *parts = (drawn.doubted(model, named, ours + others @ one.T) for one in moved)
+    low, high = np.quantile(np.min(parts, axis=0), 0.025, axis=0), np.quantile(np.max(parts, axis=0), 0.975, axis=0)
     recorded, performance = of_recording.factors, drawn.performance(model)  # all readings at once come first
     quantities = [Quantity.of_draws(each, of) for each, of in zip(over_all.T, units, strict=True)]
     of_family = np.array([family_of(one) for one in field.effects for _ in one.coefficients])[placed]
     scales = dict(zip(field.field.families, sizes.families.T, strict=True))
-    u, change = np.array([one.u for one in quantities]), whole[same]
+    u, change = np.array([one.u for one in quantities]), moved[0]
     influence = influence_of(over_all, u, scales, lambda name: others @ np.where(of_family == name, change, 0.0).T, {})
     return FactorRegions(
         dict(zip(keys, quantities, strict=True)),
@@ -319,27 +313,30 @@ def filling(machine: Machine, ends: Ends = ((0.0, 1.0),) * 3) -> Floats:
     )
 
 
-def _moved(machine: Machine, named: Sequence[Effect], others: Sequence[Effect], ends: Ends) -> Floats:
-    """(k, j) by which named errors, as told of a region, change with a unit of each coefficient of others.
+def _moved(machine: Machine, named: Sequence[Effect], others: Sequence[Effect], regions: Sequence[Ends]) -> Floats:
+    """(r, k, j) by which named errors, as told of each region, change with a unit of each coefficient of others.
 
-    Not a number for a named error that cannot be told there. ``ends``: of the region, in shares of the travels.
+    Not a number for a named error that cannot be told there. ``regions``: their ends, in shares of the travels.
     """
-    readings = filling(machine, ends)
-    one = np.ones(len(readings), dtype=np.int64)
-    about = About(Points(machine.coordinates(readings), one, np.arange(len(readings)), one, machine))
-    known, moving = ([about.columns(one).reshape(3 * len(readings), -1) for one in each] for each in (named, others))
+    readings = np.array([filling(machine, ends) for ends in regions])
+    every, r, one = readings.reshape(-1, 3), len(regions), np.ones(readings[..., 0].size, dtype=np.int64)
+    about = About(Points(machine.coordinates(every), one, np.arange(len(every)), one, machine))
+
+    def columns(effect: Effect) -> Floats:
+        return about.columns(effect).reshape(r, 3 * readings.shape[1], -1)
+
     # a squareness that nobody named is none of the scales and rotations that were: what every machine has stands for itself
-    own = {one.name for one in named}
-    every = zip(others, moving, strict=True)
-    beside = [seen for one, seen in every if one.everywhere and not one.of_artefact and one.name not in own]
-    k, offsets = sum(seen.shape[1] for seen in known), readings - readings.mean(axis=0)
-    turned = np.cross(np.eye(3)[:, None], offsets).transpose(1, 2, 0)
-    rigid = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=2).reshape(-1, 6)
-    design = np.hstack([*known, rigid, *beside])
-    length = np.linalg.norm(design, axis=0)
+    own, known = {one.name for one in named}, [columns(one) for one in named]
+    beside = [columns(one) for one in others if one.everywhere and not one.of_artefact and one.name not in own]
+    turned = np.cross(np.eye(3)[:, None, None], readings - readings.mean(axis=1, keepdims=True)).transpose(1, 2, 3, 0)
+    rigid = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned], axis=3).reshape(r, -1, 6)
+    k, design = sum(seen.shape[2] for seen in known), np.concatenate([*known, rigid, *beside], axis=2)
+    length = np.linalg.norm(design, axis=1)
     length[length == 0] = 1.0
-    inverse = np.linalg.pinv(design / length, rcond=_RANK) / length[:, None]
-    told = np.abs(inverse[:k] @ design - np.eye(k, design.shape[1]))
-    found = inverse[:k] @ np.hstack([rigid[:, :0], *moving])
-    found[np.any(told * length[:k, None] > _ANOTHER * length, axis=1)] = np.nan
-    return np.asarray(found)
+    inverse = np.linalg.pinv(design / length[:, None], rcond=_RANK)[:, :k] / length[:, :k, None]
+    told = np.abs(inverse @ design - np.eye(k, design.shape[2]))
+    moving = [columns(one) for one in others]
+    found = np.array(
+        [np.hstack([one[:, :0], one @ np.hstack([seen[i] for seen in moving])]) for i, one in enumerate(inverse)]
+    )
+    return np.where(np.any(told * length[:, :k, None] > _ANOTHER * length[:, None], axis=2)[..., None], np.nan, found)

@@ -76,7 +76,7 @@ def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Findin
         together, words, aside = cause
         off = [left.pop(j) for j in tuple(left) if rows[j] in together]
         findings.append(replace(finding("outlier", points, together, words(points, together, off)), set_aside=aside))
-    return replace(model, used=used), findings
+    return model.using(used), findings
 
 
 def _about_repeats(model: RecordingModel, linear: LinearModel) -> LinearModel:
@@ -102,7 +102,7 @@ def with_noise(model: RecordingModel) -> tuple[RecordingModel, Estimate, float |
 
 def parameters(model: RecordingModel, values: Floats) -> dict[str, dict[str, Quantity]]:
     """Reported parameters of each effect, by effect and name, of draws (N, k) of the unknowns."""
-    return {effect.name: _quantities(model, values)[effect.name] for effect in model.effects}
+    return {owner: found for owner, found in _quantities(model, values).items() if owner != ARTEFACT}
 
 
 def named_draws(
@@ -246,7 +246,7 @@ def accuracy(
     lengths = artefact.lengths()
     if lengths is None or (returning and not np.any(posterior.sizes.placing)):
         return {}
-    every = replace(model, used=np.ones_like(model.used))
+    every = model.using()
     linear, components, sizes = every.linearised(estimate.about), noise_of(every), posterior.sizes
     chosen = repeated_draws(len(posterior.draws), len(lengths))
     predicted, sizes = lengths - linear.observed + posterior.draws[chosen] @ linear.design.T, sizes.at(chosen)

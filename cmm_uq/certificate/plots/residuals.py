@@ -42,7 +42,7 @@ def length_plot(
     404.2357 mm"; ``reference_expanded_um``: its U, µm: the half width of the band about zero; ``flagged``: (n,) true where
     screening flagged the position.
     """
-    from matplotlib.ticker import MaxNLocator, MultipleLocator
+    from matplotlib.ticker import MaxNLocator, MultipleLocator, NullFormatter, NullLocator
 
     expanded_after_um = expanded_before_um if expanded_after_um is None else expanded_after_um
     given = [(before_label, before_um, expanded_before_um, ACCENT if after_um is None else MUTED)]
@@ -74,7 +74,8 @@ def length_plot(
             ax.set_ylabel(say("Deviation / µm"))
             style.panel_title(ax, label, colour)
         for ax in axes[:-1]:
-            ax.tick_params(bottom=False)
+            ax.xaxis.major = type(ax.xaxis.major)()  # or ticks as of the last panel are made, and not shown
+            ax.xaxis.set(major_locator=NullLocator(), major_formatter=NullFormatter())
         room = 0.8 + 0.01 * float(np.ptp(x))
         axes[-1].set(xlabel=position_label, xlim=(x.min() - room, x.max() + room))
         axes[-1].xaxis.set_major_locator(MultipleLocator(1) if np.ptp(x) <= 30 else MaxNLocator(12, integer=True))
@@ -242,8 +243,7 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         raise CmmUqError("a budget without a source has no picture")
     from matplotlib import rcParams
 
-    order = np.argsort(-share, kind="stable")
-    rows = np.arange(len(order))
+    order, rows = np.argsort(-share, kind="stable"), np.arange(len(share))
     names = [style.folded(sources[index], style.NAMES_MM) for index in order]
     height = 10 + (7.0 if any(len(lines) > 1 for lines in names) else 6.0) * len(order)
     with style.picture(height, left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height) as (figure, ax):

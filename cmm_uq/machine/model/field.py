@@ -278,6 +278,7 @@ def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
     The mean of σ²·cos(2πd/λ) over ln λ: σ²·(Ci(2πd/λ₀) − Ci(2πd/λ₁))/ln(λ₁/λ₀); where σ goes by λ, of each band by its part.
     """
     (shape,), own = effect.shape, effect.coefficients[0].prior_sd
+    one, place = np.unique(one, return_inverse=True)  # points that fill a region stand at few
     distance, whole = 2 * np.pi * np.abs(np.subtract.outer(one, other)), np.zeros(())
     for bands in effect.errors or (((shape.low, shape.high, own),),):
         same, every = distance < _SAME * bands[0][0], np.log(bands[-1][1] / bands[0][0])
@@ -286,7 +287,7 @@ def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
             found = scipy.special.sici(apart / low)[1] - scipy.special.sici(apart / high)[1]
             found[same] = np.log(high / low)
             whole = whole + (MICROMETRE * sd) ** 2 * (found / every)
-    return np.asarray(whole)
+    return np.asarray(whole)[place]
 
 
 def _evenly(low: float, high: float, count: int) -> list[float]:

@@ -121,6 +121,11 @@ class RecordingModel:
             found[ARTEFACT, size.name] = values, size.unit
         return found
 
+    def using(self, used: NDArray[np.bool_] | None = None) -> RecordingModel:
+        """Of some of the observations, by default of all; itself where these are its own, with what is known of it already."""
+        used = np.ones_like(self.used) if used is None else used
+        return self if np.array_equal(used, self.used) else replace(self, used=used)
+
     def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
         """Errors e (n, 3), mm, of points indicated at ``xyz``."""
         points = self.artefact.points.at(xyz)

@@ -48,7 +48,7 @@ def test_a_yaw_of_x_is_a_scale_error_of_x_in_proportion_to_the_height_of_y(
 ) -> None:
     """By hand: an angle α·x about z moves what stands at y by −α·x·y along x: −α·y a length, −α·ȳ over a region. The rest,
     (x − x̄)·(y − ȳ), has no slope along x. For 1 ″/m."""
-    ratio = room._moved(MACHINE, effects(SIX), effects(["rotation_x_z"]), (WHOLE[0], ends, WHOLE[2]))
+    ratio = room._moved(MACHINE, effects(SIX), effects(["rotation_x_z"]), [(WHOLE[0], ends, WHOLE[2])])[0]
     assert ratio[0, 0] == pytest.approx(-SECOND / 1000 * middle * 1e6, rel=1e-9)
 
 
@@ -57,7 +57,7 @@ def test_a_wave_along_x_is_the_scale_that_fits_it_over_the_whole_region(low: flo
     """By hand: of √2·cos(κ(u + ⅛)), κ = πk/(5/4), u from a to b, the slope that fits best is 12/(b − a)³·∫(u − m)·√2·cos du,
     of the bow that at m, over the travel of 900 mm. At four places with the ends among them it was a quarter off."""
     waves = [one for one in curves() if one.name == "scale_curvature_x"]
-    ratio = room._moved(MACHINE, effects(SIX), waves, ((low, high), *WHOLE[1:]))[0]
+    ratio = room._moved(MACHINE, effects(SIX), waves, [((low, high), *WHOLE[1:])])[0][0]
     turns, middle = np.pi * np.arange(1, 11) / 1.25, (low + high) / 2
     u = np.array([[low], [high]])
     angle = turns * (u + 0.125)
@@ -71,23 +71,23 @@ def test_a_wave_along_x_is_the_scale_that_fits_it_over_the_whole_region(low: flo
 
 def test_an_error_that_is_named_itself_is_not_told_of_another() -> None:
     """A scale error beside the same one: exactly one for one, and nothing of all others."""
-    ratio = room._moved(MACHINE, effects(SIX), effects(["scale_y"]), room.EIGHTHS[5])
+    ratio = room._moved(MACHINE, effects(SIX), effects(["scale_y"]), [room.EIGHTHS[5]])[0]
     np.testing.assert_allclose(ratio[:, 0], [0, 1, 0, 0, 0, 0], atol=1e-9)
 
 
 def test_a_squareness_that_nobody_named_is_no_scale_and_no_rotation() -> None:
     """−S·y along x is not x and not −x·y; least squares of these two alone would take it for a yaw of 1.23·S per metre."""
     named, everywhere = effects(["scale_x", "rotation_x_z"]), effects(["squareness_xy", "squareness_zx", "scale_y"])
-    ratio = room._moved(MACHINE, named, everywhere, WHOLE)
+    ratio = room._moved(MACHINE, named, everywhere, [WHOLE])[0]
     np.testing.assert_allclose(ratio, 0.0, atol=1e-9)
-    bow = room._moved(MACHINE, named, (*everywhere, *effects(["straightness_y_x"])), WHOLE)
+    bow = room._moved(MACHINE, named, (*everywhere, *effects(["straightness_y_x"])), [WHOLE])[0]
     assert np.all(np.isfinite(bow))
 
 
 def test_what_cannot_be_told_in_a_region_is_no_number() -> None:
     """The same error named twice."""
     twice = (*effects(["scale_x"]), *effects(["scale_x"]), *effects(["scale_z"]))
-    ratio = room._moved(MACHINE, twice, effects(["scale_y"]), WHOLE)
+    ratio = room._moved(MACHINE, twice, effects(["scale_y"]), [WHOLE])[0]
     assert np.isnan(ratio[:, 0]).tolist() == [True, True, False]
 
 

@@ -70,6 +70,8 @@ def log_sum_of_powers(base: Floats, degrees: int, axis: int | tuple[int, ...]) -
 
 def eigen(blocks: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues (…, r), vectors (…, r, r) of symmetric matrices; of two columns by Jacobi's rotation (Golub, Van Loan)."""
+    if blocks.shape[-1] == 1:
+        return blocks[..., 0], np.ones_like(blocks)
     if blocks.shape[-1] != 2:
         strengths, turn = np.linalg.eigh(blocks)
         return np.asarray(strengths), np.asarray(turn)

@@ -53,7 +53,6 @@ class CandidateComparison:
     certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     display: Display | None = None  # steps to which all coordinates are rounded, where they matter
     often_heavy: float = OFTEN  # probability, beforehand, that recordings of which nothing is missing have heavy tails
-    _axes: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, init=False)
     _best: dict[frozenset[Version], dict[int, tuple[float, Version]]] = field(default_factory=dict, init=False)
     _weighed: dict[frozenset[Version], ConditionedData] = field(default_factory=dict, init=False)
 
@@ -123,6 +122,11 @@ class CandidateComparison:
                 block[:] = each @ other.transpose(0, 2, 1)
             found.append(blocks)
         return found
+
+    @cached_property
+    def _axes(self) -> list[tuple[Floats, Floats]]:
+        """Strengths (k, M, r) of each member's principal axes, and these (k, M, r, r), by group."""
+        return [algebra.eigen(blocks) for blocks in self._blocks]
 
     @cached_property
     def _left_weighed(self) -> Floats:
@@ -270,7 +274,7 @@ class CandidateComparison:
         most = 2 * sum(some.r * len(some.start) for some in chosen) > self._stack[0].shape[1]
         kept = known.made_of is not None and (most or self._given.kept(known))
         size = max(1, _BLOCK // (len(known.squares) * AMPLITUDES * b))
-        for part, some, blocks in zip(parts, chosen, self._blocks, strict=True):
+        for part, some, blocks, axes in zip(parts, chosen, self._blocks, self._axes, strict=True):
             if not len(some.start):
                 continue
             kinds = len(known.squares)
@@ -284,27 +288,27 @@ class CandidateComparison:
                 found = (some.columns(self._stack[0]).T @ known.seen_by).reshape(some.r * len(some.start), kinds, -1)
                 found = found.transpose(1, 0, 2)
             seen = found.reshape(kinds, len(some.start), some.r, -1)
-            if sizes and (each := self._of_wide(known, some, blocks, part, seen)) is not None:
+            if sizes and (each := self._of_wide(known, some, axes, part, seen)) is not None:
                 yield some, each
                 continue
             total = np.empty((len(some.start), AMPLITUDES if sizes else 1, b))
             for begin in range(0, len(total), size):
                 these = slice(begin, begin + size)
-                total[these] = self._under(
-                    known, some.amplitudes[these], blocks[:, part][:, these], seen[:, these], sizes
-                )
+                if known.width > b:
+                    strengths, turn = algebra.eigen(blocks[:, part][:, these] - algebra.squared(seen[:, these, :, b:]))
+                else:
+                    strengths, turn = (each[:, part][:, these] for each in axes)
+                total[these] = self._under(known, some.amplitudes[these], strengths, turn, seen[:, these, :, :b], sizes)
             yield some, total
 
     def _of_wide(
-        self, known: ConditionedData, group: MemberGroup, blocks: Floats, part: slice, seen: Floats
+        self, known: ConditionedData, group: MemberGroup, axes: tuple[Floats, Floats], part: slice, seen: Floats
     ) -> Floats | None:
         """As :meth:`_under`, where members have far more columns than what is given beside the recording; else ``None``."""
         given = seen.shape[3] - 1
         if known.squares.shape[1] > 1 or not given or group.r < _CORRECTED * given:
             return None
-        if group.r not in self._axes:
-            self._axes[group.r] = algebra.eigen(blocks)
-        strengths, turn = (axes[:, part] for axes in self._axes[group.r])
+        strengths, turn = (each[:, part] for each in axes)
         variance = (group.amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
         gains = algebra.woodbury(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
@@ -315,20 +319,16 @@ class CandidateComparison:
         found += known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3) - log
         return algebra.log_sum_in(found, 0)[..., None]
 
-    def _under(self, known: ConditionedData, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
+    def _under(
+        self, known: ConditionedData, amplitudes: Floats, strengths: Floats, turn: Floats, shown: Floats, sizes: bool
+    ) -> Floats:
         """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
 
-        ``amplitudes`` (M, a) to try; ``blocks`` (k, M, r, r) their inner products; ``seen`` (k, M, r, b + g) theirs
-        with the data and with what is given.
+        ``amplitudes`` (M, a) to try; ``strengths`` (k, M, r) and ``turn`` (k, M, r, r) of their principal axes; ``shown``
+        (k, M, r, b) their inner products with the data.
         """
         b = known.squares.shape[1]
-        shown, hidden = seen[..., :b], seen[..., b:]
-        if hidden.shape[3]:
-            blocks = blocks - algebra.squared(hidden)
-        if blocks.shape[3] == 1:
-            strengths = blocks[..., 0]
-        else:
-            strengths, turn = algebra.eigen(blocks)
+        if strengths.shape[2] > 1:
             shown = turn.swapaxes(2, 3) @ shown
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)

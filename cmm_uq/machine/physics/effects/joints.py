@@ -259,15 +259,7 @@ def tips_of(points: Points) -> Floats:
 
 
 _EVERY: tuple[Callable[[str], OfJoint], ...] = (Zero, Length, Twist, Offset, Parallelism)
-_REVOLUTE: tuple[Callable[[str], OfJoint], ...] = (
-    Eccentricity,
-    Ovality,
-    GearError,
-    Slack,
-    Sag,
-    SagOfLinks,
-    Compliance,
-)
+_REVOLUTE: tuple[Callable[[str], OfJoint], ...] = (Eccentricity, Ovality, GearError, Slack, Sag, SagOfLinks, Compliance)
 
 
 def effects_of_arm(points: Points) -> dict[str, Effect]:
