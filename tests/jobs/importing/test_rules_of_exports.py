@@ -37,7 +37,8 @@ def of_errors(formula: str) -> str:
 @pytest.mark.parametrize(
     ("formula", "sign"),
     [("Abweichung = Kalibrierwert − Istwert", -1), ("Abweichung = Istwert - Kalibrierwert", 1),
-     ("Fehler = Kalibrierwert - Anzeige der Maschine", -1), ("Hinweis: alle Werte bei 20 °C", 1)],
+     ("Fehler = Kalibrierwert - Anzeige der Maschine", -1), ("Abweichung = Zorkwert - Istwert", -1),
+     ("Abweichung = Zorkwert - Kalibrierwert", 1), ("Hinweis: alle Werte bei 20 °C", 1)],
 )  # fmt: skip
 def test_deviations_are_the_way_round_that_the_file_says(formula: str, sign: int) -> None:
     found = lengths(of_errors(formula))
@@ -48,6 +49,11 @@ def test_deviations_said_both_ways_round_are_asked_about() -> None:
     text = of_errors("Abweichung = Istwert - Kalibrierwert\nAbweichung = Kalibrierwert - Istwert")
     with pytest.raises(NotReadError, match="says that deviations are"):
         imported(text.encode(), "x.csv", ImportKeys())
+
+
+def test_deviations_by_words_that_nobody_knows_are_asked_about() -> None:
+    with pytest.raises(NotReadError, match="which of both was measured"):
+        imported(of_errors("Abweichung = Zorkwert - Blubwert").encode(), "x.csv", ImportKeys())
 
 
 def in_names(word: str) -> str:

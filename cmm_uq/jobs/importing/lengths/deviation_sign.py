@@ -21,15 +21,26 @@ def turned_by(sheets: Sequence[Sheet], heads: Iterable[str], where: str, *, targ
     heads : of the columns of deviations; targets : whether these are at targets, which a laser measures.
     """
     own = {" ".join(plain_words(head)) for head in heads}
-    told: dict[bool, str] = {}
+    told, unknown = dict[bool, str](), ""
     for text in dict.fromkeys(cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str)):
         for match in _FORMULA.finditer(text):
             left = " ".join(plain_words(match[1]))
             if said(match[1]) != "deviation" and left not in own:
                 continue
             first, second = (_rank(match[k]) for k in (2, 3))
-            if None not in (first, second) and first != second and (not targets or 2 in (first, second)):
-                told.setdefault(first > second, match[0].strip())  # type: ignore[operator]
+            if first is None and second is None:
+                unknown = unknown or match[0].strip()
+                continue
+            # of two the one that words know says what the other is
+            first = first if first is not None else 0 if second else 2
+            second = second if second is not None else 0 if first else 2
+            if first != second and (not targets or 2 in (first, second)):
+                told.setdefault(first > second, match[0].strip())
+    if unknown and not told and not targets:
+        what = f"says {unknown!r}, and no word of it which of both was measured"
+        raise NotReadError(
+            what, where=where, fix='Write it as "deviation = measured - reference", or the other way round'
+        )
     if len(told) > 1:
         what = f"says that deviations are {told[False]!r}, and {told[True]!r}"
         raise NotReadError(what, where=where, fix="Take out what is not so")
