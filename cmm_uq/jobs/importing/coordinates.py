@@ -28,6 +28,7 @@ _SAME = 2.0  # between what is nominal and what is measured; or a part of 0.002
 _EXACT = ("nominal", "reference", "target")
 _OF_LENGTHS = ("reference", "measured")
 _FINER = 50  # times, that lengths are printed finer than the places where they were measured
+_SCATTER = 1e-3  # of how far a place is away
 _WIDE = 4.0  # of deviations and tolerances, in the unit of the file
 _PROBED = 8  # places on a circle
 _FEW = 3  # places, which may be round by chance
@@ -70,6 +71,13 @@ class Triple:
         """Whether they are as far apart as places are, and deviations are not."""
         unit, extent = self.columns[0].unit, np.nanmax(self.values, axis=0) - np.nanmin(self.values, axis=0)
         return bool(extent.max() > _WIDE or (unit is not None and unit.name not in SMALL and extent.max() > 0))
+
+    @property
+    def again(self) -> bool:
+        """Whether they are one place, measured again and again; below ``X = 60`` lengths of a line stand as well."""
+        own = self.values[np.isfinite(self.values).all(axis=1)]
+        headed = len(own) > 0 and not any(_EQUAL.search(text) for c in self.columns for text in c.path)
+        return headed and bool(np.ptp(own, axis=0).max() < _SCATTER * np.linalg.norm(own.mean(axis=0)))
 
     @property
     def grain(self) -> float:
@@ -263,7 +271,8 @@ def _measured(triples: Sequence[Triple], where: str) -> tuple[list[Triple], int]
     """
     rest = [t for t in triples if not t.directed and np.ptp(t.values, axis=1).any()]
     wide = [t for t in rest if t.wide]
-    one_place = [t for t in rest if 1 in (len(t.columns), len(t.values)) and np.nanmax(np.abs(t.values)) > _WIDE]
+    single = [t for t in rest if 1 in (len(t.columns), len(t.values)) or t.again]
+    one_place = [t for t in single if np.nanmax(np.abs(t.values)) > _WIDE]
     large = wide or one_place
     nominal, confirmed, deviating = set[Triple](), set[Triple](), set[Triple]()
     for a, b in permutations(large, 2):

@@ -145,3 +145,26 @@ def test_distances_of_a_dmis_output_are_lengths() -> None:
     found = lengths("DMISMN/'E0',05.3\nUNITS/MM,ANGDEC\n" + "".join(halves), "x.dmo")
     assert ({*found.names}, found.repeat[:3]) == ({"POSITION 1", "POSITION 2"}, [1, 2, 3])
     assert found.measured[1] == pytest.approx(100.0018, abs=1e-9)
+
+
+def test_places_measured_again_are_read_before_a_sheet_of_their_distances() -> None:
+    at = {"A": (120.0, 80.0, 60.0), "B": (420.0, 480.0, 60.0)}
+    rows = [",".join(map(str, (k, *(round(c + k / 5000, 4) for own in at.values() for c in own)))) for k in (1, 2, 3)]
+    found = points("Bola A/B em mm\nRepetição,Bola A,,,Bola B,,\n,X,Y,Z,X,Y,Z\n" + "\n".join(rows) + "\n")
+    xyz = np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"])
+    assert sorted(map(tuple, xyz[found.columns["repeat"] == 1].tolist())) == [
+        (120.0002, 80.0002, 60.0002),
+        (420.0002, 480.0002, 60.0002),
+    ]
+
+
+@pytest.mark.parametrize(("head", "lines"), [("Lehrring", 4), ("Endmaß", 2)])
+def test_diameters_of_each_ring_are_lines_of_their_own(head: str, lines: int) -> None:
+    of = [(name, way, d) for name, d in (("D40", 40.0012), ("D70", 69.9987)) for way in ("X", "Y")]
+    errors = ("+0,3;-0,1;+0,4", "-0,2;-0,5;0,0", "+0,8;+1,1;+0,6", "0,0;+0,4;-0,3")
+    rows = [
+        f"{name};{way}-Achse;{d:.5f};{own}".replace(".", ",") for (name, way, d), own in zip(of, errors, strict=True)
+    ]
+    text = f"{head};Richtung;Kalibrierwert (mm);Abweichung 1 (µm);Abweichung 2 (µm);Abweichung 3 (µm)\n"
+    found = lengths(text + "\n".join(rows) + "\n")
+    assert len({*found.names}) == lines

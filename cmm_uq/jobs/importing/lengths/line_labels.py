@@ -50,6 +50,7 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
             line.append(one)
     lined = any(f[2] == LINE for f in found)
     line, run = _told_apart(reference, [f for f in plain if f[2] in (None, POINT)], line, run, place, lined=lined)
+    line = _of_rings(found, line)
     # else one length on each line, which are named and not counted
     line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
     _refuse_unnamed(found, line)
@@ -65,6 +66,15 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
     numbers = factors.in_turn(key) if run is None else factors.numbered_runs(run[0].values)
     used = [f[0].words for f in (*line, *([run] if run else []))]
     return names or [titled[-1] if titled else "1"] * count, numbers, used
+
+
+def _of_rings(found: Sequence[Counted], line: list[Counted]) -> list[Counted]:
+    """Labels of lines, with the one of rings: diameters of one ring lie about its centre, those of the next elsewhere."""
+    rings = (
+        f for f in found if f[0].sort == "column" and not words_of("rows")["rings"].isdisjoint(plain_words(f[0].words))
+    )
+    more = [f for f in rings if line and not fixes(factors.together(*(g[1] for g in line)), f[1])]
+    return [*more[:1], *line]
 
 
 def _measurements(one: Counted, others: Sequence[Counted]) -> bool:
