@@ -169,9 +169,14 @@ class Combinations:
         return max(self.of_effects, key=lambda key: self.of_effects[key])
 
     def versions(self, effects: Key) -> tuple[Version, ...]:
-        """Of the most probable combination with these known effects, or more."""
-        keys = [key for key in self.by_key if self.effects_of(key) >= effects]
-        return self.by_key[self.likeliest(keys)].versions
+        """Of the most probable combination with these known effects, or more; else of most of them, and each other's own."""
+        if keys := [key for key in self.by_key if self.effects_of(key) >= effects]:
+            return self.by_key[self.likeliest(keys)].versions
+        most = max(len(effects & key) for key in self.by_key)
+        best = self.likeliest(key for key in self.by_key if len(effects & key) == most)
+        own = (self.by_key[self.likeliest(key for key in self.by_key if i in key)] for i in sorted(effects - best))
+        more = (v for one in own for v in one.versions)
+        return (*self.by_key[best].versions, *{v.explanation: v for v in more if v.explanation in effects - best}.values())
 
     def imitating(self, index: int) -> Key:
         """Nonparametric terms that could pass for an effect: by its form, or in this recording."""
