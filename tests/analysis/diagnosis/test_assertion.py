@@ -13,6 +13,7 @@ from cmm_uq.analysis.diagnosis import diagnosis, joint
 from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.comparison import search
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison, SearchResult, effects_to_assert, substitute
 from cmm_uq.analysis.diagnosis.held_out import Improvement
@@ -59,6 +60,14 @@ def test_a_group_is_what_could_stand_in_the_place_of_an_effect() -> None:
     found = combinations(((0,), 0.45), ((1,), 0.4), ((2,), 0.005), ((3,), 0.145))
     assert group_of(found, frozenset({0}), 0) == {1}
     assert found.of_any(frozenset({0, 1})) == pytest.approx(0.85)
+
+
+def test_effects_that_no_combination_has_together_keep_the_version_that_each_has() -> None:
+    found = combinations(((0, 1), 0.6), ((2,), 0.3), ((0,), 0.1))
+    own = {key: tuple(Version(i, 0, 1.0 + i + 10 * len(key)) for i in sorted(key)) for key in found.by_key}
+    known = replace(found, by_key={key: replace(one, versions=own[key]) for key, one in found.by_key.items()})
+    assert known.versions(frozenset({0})) == own[frozenset({0, 1})]
+    assert known.versions(frozenset({0, 1, 2})) == (*own[frozenset({0, 1})], *own[frozenset({2})])
 
 
 def test_a_function_belongs_to_it_where_effects_alone_are_no_more_than_one_half() -> None:
