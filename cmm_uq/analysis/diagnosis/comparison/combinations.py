@@ -176,7 +176,10 @@ class Combinations:
         best = self.likeliest(key for key in self.by_key if len(effects & key) == most)
         own = (self.by_key[self.likeliest(key for key in self.by_key if i in key)] for i in sorted(effects - best))
         more = (v for one in own for v in one.versions)
-        return (*self.by_key[best].versions, *{v.explanation: v for v in more if v.explanation in effects - best}.values())
+        return (
+            *self.by_key[best].versions,
+            *{v.explanation: v for v in more if v.explanation in effects - best}.values(),
+        )
 
     def imitating(self, index: int) -> Key:
         """Nonparametric terms that could pass for an effect: by its form, or in this recording."""
