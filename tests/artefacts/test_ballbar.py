@@ -127,8 +127,9 @@ def test_of_points_that_all_move_along_one_direction_the_same_is_seen(job: str) 
     """By fewer steps, as of points that move anyhow."""
     read = read_job(ROOT / "examples" / job)
     artefact = kind_of(read).observing("measured")(read.facts.artefact, read.points)
-    moved = np.random.default_rng(5).standard_normal((len(read.points), 3))
+    xyz = artefact.points.xyz
+    moved = np.random.default_rng(5).standard_normal((len(xyz), 3))
     direction = np.array([0.6, -0.64, 0.48])
-    seen = artefact.project(read.points.xyz, direction[:, None] * moved[:, None])
-    np.testing.assert_allclose(artefact.project_along(read.points.xyz, direction, moved), seen, atol=1e-12)
+    seen = artefact.project(xyz, direction[:, None] * moved[:, None])
+    np.testing.assert_allclose(artefact.project_along(xyz, direction, moved), seen, atol=1e-12)
     assert np.abs(seen).max() > 0.1
