@@ -87,28 +87,37 @@ EVERY = (
 )
 
 
+ORDERS = np.arange(1, 11)
+
+
 def function(
     axis: int, most: float, sizes: tuple[float, float], forms: int, random: np.random.Generator
 ) -> Callable[..., Any]:
     """f(a) of docs/machine/field.md, its long and its short waves as large as ``sizes`` say."""
     low, high = truth.TRAVEL[axis]
-    orders = np.arange(1, 11)
     long, short = sizes
-    each = np.where(orders <= 2, long, short) * random.standard_normal(10) / orders
+    each = np.where(ORDERS <= 2, long, short) * random.standard_normal(len(ORDERS)) / ORDERS
     simple = long * random.standard_normal(2) * [1.0, float(forms == 2)]
-
-    def waves(a: np.ndarray) -> np.ndarray:
-        return np.sqrt(2) * np.cos(np.pi * orders * (a[:, None] - low + (high - low) / 8) / (1.25 * (high - low)))
-
-    fine = np.linspace(low, high, 20_001)
-    part = most / np.sqrt(forms + np.mean((waves(fine) / orders) ** 2, axis=0).sum())
+    part = most / np.sqrt(forms + mean_square_of_waves(axis))
 
     def value(a: np.ndarray) -> np.ndarray:
         t = 2 * (a - low) / (high - low) - 1
         bow, slope = np.sqrt(5) * 0.5 * (3 * t**2 - 1), np.sqrt(3) * t
-        return part * (simple[0] * bow + simple[1] * slope + waves(a) @ each)
+        return part * (simple[0] * bow + simple[1] * slope + waves(axis, a) @ each)
 
     return value
+
+
+def waves(axis: int, a: np.ndarray) -> np.ndarray:
+    low, high = truth.TRAVEL[axis]
+    return np.sqrt(2) * np.cos(np.pi * ORDERS * (a[:, None] - low + (high - low) / 8) / (1.25 * (high - low)))
+
+
+@cache
+def mean_square_of_waves(axis: int) -> float:
+    """Over the travel, of all together, each over its order."""
+    fine = np.linspace(*truth.TRAVEL[axis], 20_001)
+    return float(np.mean((waves(axis, fine) / ORDERS) ** 2, axis=0).sum())
 
 
 def as_stated(random: np.random.Generator) -> truth.Truth:

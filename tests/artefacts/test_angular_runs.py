@@ -11,9 +11,6 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.app.commands.diagnose import screened_model
-from cmm_uq.app.commands.estimation import decision
 from cmm_uq.app.commands.jobs.controller import write_tables
 from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.app.commands.planning import make_plan
@@ -21,6 +18,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from tests.analysis.conformity.by_hand.deciding import statement_of_job
 from tests.jobs.test_reading import edit
 from tests.maths.geometry.test_positioning import by_loops
 
@@ -208,11 +206,6 @@ def decided(
     return made, first
 
 
-def statement(folder: Path) -> Statement:
-    read = read_job(folder)
-    return decision(read, *screened_model(read), 1)
-
-
 def by_hand(x: Floats) -> dict[str, float]:
     """Figures of deviations (2, targets, repeats), ″, by the printed formulas, term by term."""
     n, up, down = x.shape[2], x[0], x[1]
@@ -234,14 +227,14 @@ def by_hand(x: Floats) -> dict[str, float]:
 @pytest.mark.parametrize("figure", ["A", "E", "R", "B", "M"])
 def test_a_figure_of_a_table_is_decided_against_its_limit_in_arcseconds(tmp_path: Path, figure: str) -> None:
     folder, first = decided(tmp_path / "job", figure)
-    told = statement(folder)
+    told = statement_of_job(folder)
     value = by_hand(first)[figure]
     assert told.value_um == pytest.approx(value, abs=2e-6)  # as an arc where 1 µm is 1″
     assert told.limit_um == pytest.approx(14.0)
     assert told.outcome == "pass", told.missing
     u = told.u_um
     strict, _ = decided(tmp_path / "strict", figure, f"limit_arcsec = {value - 3 * u:.6f}")
-    assert statement(strict).outcome == "fail"
+    assert statement_of_job(strict).outcome == "fail"
 
 
 @pytest.mark.parametrize(
@@ -256,7 +249,7 @@ def test_a_test_of_a_table_that_lacks_something_is_incomplete(
     tmp_path: Path, repeats: int, travel: str, extra: str, missing: str | None
 ) -> None:
     folder, _ = decided(tmp_path / "job", repeats=repeats, travel=travel, extra=extra)
-    told = statement(folder)
+    told = statement_of_job(folder)
     assert told.outcome == ("incomplete" if missing else "pass")
     assert missing is None or any(missing in str(one) for one in told.missing)
 
@@ -279,7 +272,7 @@ def test_how_many_targets_a_run_needs_goes_by_how_far_it_turns(
     """Three up to 90°, five up to 180°, eight beyond; over two thirds of the travel."""
     folder, _ = decided(tmp_path / "job", travel=f"travel_deg = {travel}")
     cut(folder, most)
-    told = statement(folder)
+    told = statement_of_job(folder)
     assert told.outcome == ("incomplete" if missing else "pass"), told.missing
     assert not missing or any(missing in str(one) for one in told.missing)
 
@@ -295,7 +288,7 @@ def test_how_many_targets_a_run_needs_goes_by_how_far_it_turns(
 def test_a_limit_that_does_not_go_with_a_table_is_refused(tmp_path: Path, change: dict[str, str], problem: str) -> None:
     folder, _ = decided(tmp_path / "job", **change)
     with pytest.raises(CmmUqError, match=problem):
-        statement(folder)
+        statement_of_job(folder)
 
 
 def test_a_figure_of_a_straight_axis_has_no_limit_in_arcseconds(tmp_path: Path) -> None:
@@ -307,7 +300,7 @@ def test_a_figure_of_a_straight_axis_has_no_limit_in_arcseconds(tmp_path: Path) 
     assert "limit_um" in text
     toml.write_text(re.sub(r"limit_um = [\d.]+", "limit_arcsec = 5.0", text, count=1), encoding="utf-8")
     with pytest.raises(CmmUqError, match="is of no angle, and its limit is not"):
-        statement(tmp_path / "job")
+        statement_of_job(tmp_path / "job")
 
 
 def test_without_what_is_uncertain_of_repeats_or_alignment_no_table_passes(tmp_path: Path) -> None:
@@ -315,7 +308,7 @@ def test_without_what_is_uncertain_of_repeats_or_alignment_no_table_passes(tmp_p
     toml = folder / "job.toml"
     text = toml.read_text(encoding="utf-8").replace("u_repeat_arcsec = 0.05", "u_repeat_um = 0.05")
     toml.write_text(text[: text.index("alignment = ")] + text[text.index("[rated_conditions]") :], encoding="utf-8")
-    told = statement(folder)
+    told = statement_of_job(folder)
     assert told.outcome == "incomplete"
     said = " ".join(map(str, told.missing))
     assert "alignment of the artefact is neither stated" in said
@@ -326,7 +319,7 @@ def test_without_what_is_uncertain_of_repeats_or_alignment_no_table_passes(tmp_p
 def test_the_laboratorys_own_rule_decides_a_table_too(tmp_path: Path) -> None:
     extra = "complete = { measurements = 1, repeats = 5, points = 24 }\n"
     folder, first = decided(tmp_path / "job", "R", standard="laboratory's own rule", extra=extra)
-    told = statement(folder)
+    told = statement_of_job(folder)
     assert told.value_um == pytest.approx(by_hand(first)["R"], abs=2e-6)
     assert told.outcome == "pass", told.missing
 

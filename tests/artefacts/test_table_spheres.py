@@ -15,7 +15,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from tests.analysis.conformity.by_hand.deciding import decided
+from tests.analysis.conformity.by_hand.deciding import data_of_job, decided
 from tests.conftest import ROOT
 from tests.jobs.test_reading import edit
 
@@ -85,7 +85,7 @@ def test_a_test_uncertainty_is_what_changed_between_the_positions(job: Path) -> 
     """u_repeat_um as it is stated; the machine's own scatter is what is tested."""
     edit(job, r"^\[test_uncertainty.negligible\]\nrepeat = .*", "[test_uncertainty]\nu_repeat_um = 0.2")
     edit(job, r"^limit_um = .*", 'limit_um = 8.0\nrule = "ISO 14253-1"')
-    errors = cmm_uq.report(job, seed=1).results["conformity"][0]["errors"]
+    errors = data_of_job(job)["errors"]
     assert {one["u_um"] for one in errors} == {0.2}
 
 

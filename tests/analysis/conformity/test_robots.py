@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import cmm_uq
 from cmm_uq.analysis.conformity.robots import copied, counting, five_in_a_plane
 from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.artefacts import artefact_facts
@@ -23,6 +22,7 @@ from cmm_uq.artefacts.optical.tracked import TrackedPoints
 from cmm_uq.base.arm import Arm
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
+from tests.analysis.conformity.by_hand.deciding import data_of_job
 from tests.jobs.test_reading import edit
 
 TIPS = np.array([[100.0, 0.0, 20.0], [-50.0, 80.0, 20.0], [-40.0, -90.0, 35.0], [10.0, 20.0, 90.0]])
@@ -125,8 +125,7 @@ def job_with(
         writer.writerows(rows)
     for old, new in edits:
         edit(job, old, new)
-    statement: dict[str, Any] = cmm_uq.report(job, seed=1).results["conformity"][0]
-    return statement
+    return data_of_job(job)
 
 
 def pasted(*poses: str, later: str = "30", first: str = "28") -> Callable[[list[dict[str, str]]], None]:

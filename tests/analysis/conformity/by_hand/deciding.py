@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from cmm_uq.analysis.conformity.accuracy import figures
@@ -11,10 +12,12 @@ from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.app.commands.diagnose import screened_model
-from cmm_uq.app.commands.reading import job_of
+from cmm_uq.app.commands.estimation import decision
+from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.app.commands.report import evaluate_job as analyse_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.units import unit
+from cmm_uq.certificate.results.contents import statement_data
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
@@ -38,3 +41,14 @@ def reported(files: Mapping[str, bytes]) -> Statement:
     found: Any = analyse_job(job_of(files))
     (only,) = found.statements
     return only  # type: ignore[no-any-return]
+
+
+def statement_of_job(folder: Path) -> Statement:
+    """The first of a job, of a standard that needs no estimate of the machine's errors."""
+    job = read_job(folder)
+    return decision(job, *screened_model(job), 1)
+
+
+def data_of_job(folder: Path) -> dict[str, Any]:
+    """The same as in results.json."""
+    return statement_data(statement_of_job(folder))
