@@ -329,7 +329,8 @@ class CutSheet:
         head: list[int] = []
         for row in reversed(pending):
             filled = [k for k, cell in enumerate(self.sheet.rows[row]) if cell != ""]
-            if not head and filled == [0] and len(numbers) > 1:  # a title below its head
+            alone = len(filled) == 1 and (filled == [0] or ": " in self.text(row, filled[0]))
+            if not head and alone and len(numbers) > 1:  # a title below its head
                 if pending[-1] - row < _TITLES:
                     continue
                 break

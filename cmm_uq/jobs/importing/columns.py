@@ -175,7 +175,8 @@ class ExportTable:
             if (is_summary(row) and not self.kinds) or i >= self.header.first + self.called:
                 self.left_out.append(shown(sheet, i, SUMMARY))
             elif all(place >= len(row) or row[place] == "" for place in needed) or (
-                any(place >= len(row) or row[place] == "" for place in needed) and not any(map(_figured, row))
+                any(place >= len(row) or row[place] == "" for place in needed)
+                and not any(cell != "" and is_number(cell) for cell in row)
             ):
                 text.append(i)
             else:
@@ -309,10 +310,6 @@ class ExportTable:
 def _of_another_table(error: CmmUqError) -> NotReadError:
     """Of a cell beside coordinates, whose row may be something else, as the centre below the points of a ball."""
     return NotReadError(error.problem, where=error.where, fix=error.fix)
-
-
-def _figured(cell: Cell) -> bool:
-    return cell != "" and is_number(cell)
 
 
 def _first_of(words: Sequence[str], join: Callable[[Sequence[Text]], Text]) -> Text:

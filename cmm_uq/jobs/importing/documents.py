@@ -61,8 +61,9 @@ class Qif(Format):
             beside += [own] * (len(rows) - len(beside))
         if not rows:
             problem = f"holds no measured sphere, point or circle, and {others} other features"
-            fix = "Export the results with the measured features and their locations"
-            raise CmmUqError(problem, where=where, fix=fix)
+            raise CmmUqError(
+                problem, where=where, fix="Export the results with the measured features and their locations"
+            )
         facts = facts_of(Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", ""))),
                          "features_not_used", say("Features that are no place"), others)  # fmt: skip
         further = [*dict.fromkeys(name for one in beside for name in one)]
@@ -85,8 +86,8 @@ def length_unit(root: Element, where: str) -> str | None:
     if unit is None or abs(unit.metres / metres - 1) > 1e-6:
         unknown = f"of {factor} m is not known"
         problem = unknown if factor else "has no Factor to metres (UnitConversion), and is then the metre"
-        fix = "Export the results in mm or inch"
-        raise CmmUqError(f"the unit {name!r} {problem}", where=f"{where}: FileUnits", fix=fix)
+        what = f"the unit {name!r} {problem}"
+        raise CmmUqError(what, where=f"{where}: FileUnits", fix="Export the results in mm or inch")
     return unit.name
 
 
@@ -118,8 +119,7 @@ def _points(element: Element, where: str) -> Iterator[Row]:
 
 def three(text: str, place: str) -> list[str]:
     """The three numbers of a place or a direction, as they are written."""
-    words = text.split()
-    if len(words) != 3:
+    if len(words := text.split()) != 3:
         raise CmmUqError(f"has {len(words)} coordinates where a place has three", where=place,
                          fix="Export the results with the locations of the measured features")  # fmt: skip
     return words
@@ -150,9 +150,9 @@ class Dcc(Format):
             columns = [_column(one, where) for one in of_result]
             if any(len(cells) > 1 for _, cells in columns):
                 sheets.append(_sheet(place[1], columns, where))
+        fix = "Give the certified values as a CSV with the columns point and reference_mm"
         if not sheets:
-            raise CmmUqError("holds no result with lists of values", where=where,
-                             fix="Give the certified values as a CSV with the columns point and reference_mm")  # fmt: skip
+            raise CmmUqError("holds no result with lists of values", where=where, fix=fix)
         return sheets
 
 
@@ -173,8 +173,9 @@ def _column(quantity: QuantityFigures, where: str) -> tuple[str, list[str]]:
 
 def _sheet(name: str, columns: Sequence[tuple[str, list[str]]], where: str) -> Sheet:
     count = max(len(values) for _, values in columns)
-    odd = next((heading for heading, values in columns if len(values) not in (1, count)), None)
-    if odd is not None or count > ROWS.most:
+    if (
+        odd := next((heading for heading, values in columns if len(values) not in (1, count)), "")
+    ) or count > ROWS.most:
         raise CmmUqError(f"the lists of {name!r} differ in length ({odd!r})", where=where,
                          fix="Ask the laboratory for a certificate whose lists belong together")  # fmt: skip
     full = ([heading, *(values if len(values) == count else values * count)] for heading, values in columns)
@@ -285,13 +286,11 @@ class Json(Format):
             as_text: Any = dict.fromkeys(("parse_float", "parse_int", "parse_constant"), str)
             whole = json.loads(text.lstrip("\ufeff"), object_pairs_hook=_once, **as_text)
         except (ValueError, RecursionError) as error:
-            line = getattr(error, "lineno", 0)
-            at = f"{where} line {line}" if line else where
+            at = f"{where} line {error.lineno}" if isinstance(error, json.JSONDecodeError) else where
             fix = "Export it again: it was cut off or changed"
             raise CmmUqError(f"is damaged JSON: {error}", where=at, fix=fix) from None
-        return [
-            _of_rows(_Records(whole, where).rows, None, where, Fact("encoding", say("Encoding"), Verbatim(encoding)))
-        ]
+        of_file = Fact("encoding", say("Encoding"), Verbatim(encoding))
+        return [_of_rows(_Records(whole, where).rows, None, where, of_file)]
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -342,8 +341,7 @@ class _Records:
         self.rows: list[list[Cell]] = []
         self.head: list[str] = []
         self.where = where
-        nodes = whole if isinstance(whole, list) else [whole]
-        for node in nodes:
+        for node in (nodes := whole if isinstance(whole, list) else [whole]):
             self.walk(node, "", {}, 0, one=len(nodes) == 1)
 
     def walk(self, node: Any, name: str, around: Mapping[str, str], depth: int, *, one: bool) -> None:
@@ -354,16 +352,16 @@ class _Records:
             self.tell(name, node)
             return
         own, inner = dict(around), [(key, value) for key, value in fields.items() if _inner(value)]
-        for key, value in fields.items():
-            if _inner(value):
-                continue
+        for key, value in ((key, value) for key, value in fields.items() if not _inner(value)):
             if one:
                 self.tell(f"{name} {key}".strip(), value)
             for label, part in _parts(key, value).items() if not one else ():
                 own[label if label not in own else f"{name} {label}"] = "" if part is None else str(part)
+        of_all = [] if one or not any(isinstance(value, list) for _, value in inner) else [*filter(_plain, inner)]
+        own |= {f"{key} {label}": str(part) for key, value in of_all for label, part in value.items()}
+        inner = [field for field in inner if field not in of_all]
         for key, value in inner:
-            values = value if isinstance(value, list) else [value]
-            for record in values:
+            for record in (values := value if isinstance(value, list) else [value]):
                 self.walk(record, key, own, depth + 1, one=one and len(values) == 1)
         if not inner and not one:
             self.add(own)
@@ -384,6 +382,11 @@ class _Records:
 def _inner(value: Any) -> bool:
     """Whether it holds records."""
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(part, dict | list) for part in value))
+
+
+def _plain(field: tuple[str, Any]) -> bool:
+    """Whether it is a record without others in it: what one says beside several holds for all of them."""
+    return isinstance(field[1], dict) and not any(map(_inner, field[1].values()))
 
 
 def _parts(key: str, value: Any) -> dict[str, Any]:

@@ -63,9 +63,10 @@ Counted = tuple[Label, Ints, str | None]  # a label, the number of its value for
 
 def ways_of(values: Sequence[str]) -> list[int] | None:
     """Sense of travel that labels name, +1 or −1; ``None`` where one of them names none, or all the same."""
-    letters = {value: re.sub(r"[\d\W]", "", value).upper() for value in {*values}}
-    if (pair := next((own for own in _PAIRS if {*own} == {*letters.values()}), None)) is not None:
-        return [pair[letters[value]] for value in values]
+    last = {value: value[-1:] if value[-2:-1] == " " else "" for value in {*values}}  # as of ``Run 1 F``
+    for letters in ({value: re.sub(r"[\d\W]", "", value).upper() for value in last}, last):
+        if (pair := next((own for own in _PAIRS if {*own} == {*letters.values()}), None)) is not None:
+            return [pair[letters[value]] for value in values]
     known = {value: way_of(value) for value in {*values}}
     first, *others = known.values()
     if len(others) == 1 and not first * others[0]:  # of two the one says the other

@@ -83,7 +83,9 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     each = int(place.max()) + 1  # of which a few have two names
     whole = (f for f in found if each <= f[1].max() < _SINGLE * each and fixes(f[1], place))
     ways += (Grouping(_NAMED, None, 0 * place, f[1], f) for f in whole)
-    plate = len(xyz) <= _COMPARED and on_a_plate(xyz[np.unique(place, return_index=True)[1]])
+    first = xyz[np.unique(place, return_index=True)[1]] if len(xyz) <= _COMPARED else xyz[:0]
+    numbered = bool(found) and all(f[1].max() + 1 == len(xyz) for f in found)  # from first to last, as of one artefact
+    plate = on_a_plate(first) or (numbered and on_a_plate(first, oblong=True))
     named = any(way.of is None and way.rank and way.at.max() + 1 < len(xyz) for way in ways)  # names that come again
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
@@ -248,17 +250,21 @@ def _shape(xyz: Floats, measurement: Ints, point: Ints) -> str:
     return "turned" if np.ptp(away, axis=1).max() > 1 else "moved"
 
 
-def on_a_plate(xyz: Floats) -> bool:
-    """Whether places (n, 3) lie in one plane, on one square grid."""
+def on_a_plate(xyz: Floats, *, oblong: bool = False) -> bool:
+    """Whether places (n, 3) lie in one plane, on one square grid; or on an oblong one of three rows and columns at least."""
+    if len(xyz) < 6:
+        return False
     about = xyz - xyz.mean(axis=0)
-    if len(xyz) < 6 or np.linalg.svd(about)[1][2] > _EVEN_MM * np.sqrt(len(xyz)):
+    if np.linalg.svd(about)[1][2] > _EVEN_MM * np.sqrt(len(xyz)):
         return False
     apart = np.linalg.norm(xyz[1:] - xyz[0], axis=1)
     one = xyz[1 + int(apart.argmin())] - xyz[0]
     pitch = np.linalg.norm(one)
-    other = np.cross(np.linalg.svd(about)[2][2], one)
-    steps = (xyz - xyz[0]) @ np.column_stack([one, other]) / pitch**2
-    return bool(np.abs(steps - np.round(steps)).max() * pitch < _EVEN_MM * 2 and np.ptp(steps, axis=0).min() > 0.5)
+    at = (xyz - xyz[0]) @ np.column_stack([one, np.cross(np.linalg.svd(about)[2][2], one)]) / pitch
+    rows = np.diff(np.sort(at[:, 1])).max() if oblong else pitch
+    steps = at / (pitch, max(rows, _EVEN_MM))
+    even = np.abs(steps - np.round(steps)).max() * pitch < _EVEN_MM * 2
+    return bool(even and np.ptp(steps, axis=0).min() > (1.5 if oblong else 0.5))
 
 
 def _on_a_ball(xyz: Floats) -> bool:

@@ -83,6 +83,7 @@ _LONGEST = 120  # characters of a heading; longer text is none
 
 # coverage factor in a heading, as ``U (µm), k = 2``
 COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGNORECASE)
+_AS_WRITTEN = re.compile(r"(?i)[dmyajt]+([-/.])[dmyajt]+\1[dmyajt]+|hh?:mm(:ss)?")  # dates and times, in a row of units
 # what certificates print above a column, beside its unit or its coverage factor
 _SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
 WORD = re.compile(r"[^\W\d_]+")
@@ -128,7 +129,10 @@ def without_unit(heading: str) -> tuple[str, WrittenUnit | None, str]:
     for pattern in (_AFTER_SIGN, _AT_THE_END):
         match = pattern.search(heading)
         if match and match.start() > 0 and (unit := unit_named(match[1])):
-            return heading[: match.start()], unit, ""
+            ahead = heading[: match.start()]
+            if match[1] == "F" and ahead.rstrip()[-1:].isdigit():  # as ``Run 1 F``, forwards
+                continue
+            return ahead, unit, ""
     return heading, None, ""
 
 
@@ -275,7 +279,9 @@ def with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping
     filled = {i: cell for i, cell in enumerate(below) if cell not in ("", "()", "[]", "-")}
     texts = {i: cell.strip("[]()<>{} ") for i, cell in filled.items() if isinstance(cell, str)}
     alone = {i: unit for i, text in texts.items() if (unit := unit_named(text))}
-    whole = bool(alone) and len(alone) == len(filled)
+    whole = bool(alone) and len(filled) == len(
+        {*alone, *(i for i, text in texts.items() if _AS_WRITTEN.fullmatch(text))}
+    )
     return Header(row, row + 1 + whole, headings, columns, units | alone if whole else units, odd)
 
 

@@ -319,12 +319,13 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     if (angle := _angle_in(sheets)) is not None:
         fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
         raise NotReadError(f"its deviations may be angles ({angle!r})", where=where, fix=fix)
-    unit = reading.unit or unit_elsewhere(sheets, small=False) or UNITS["mm"]
+    stated = reading.unit or unit_elsewhere(sheets, small=False)
+    unit = stated or UNITS["mm"]
     small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
     small = small or length_named(sheets[0].unit or "")
     most, finest = np.abs(figures[:, 1]).max(), min(c.step for c in reading.taken["reading_um"])
-    if small is None and reading.unit is not None and finest < _FINEST_UM and most < _LEAST_UM:
-        small = reading.unit
+    if small is None and finest < _FINEST_UM and most < _LEAST_UM:
+        small = stated
     if small is None and most < _MILLIMETRES:
         fix = "Write it above them: (µm) or (mm)"
         raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
@@ -335,7 +336,7 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um") * (-1 if turn else 1)
     named = [
         [find(value) or find(f"{label.words} {value}") for value in label.values]
-        for find in (axis_in, _letter_in)
+        for find in (axis_in, letter_in)
         for label in labels
     ]
     axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
@@ -376,7 +377,7 @@ def axis_in(text: str) -> str:
     return (found[1] or found[2]).upper() if found else ""
 
 
-def _letter_in(text: str) -> str:
+def letter_in(text: str) -> str:
     """The one letter of an axis that stands alone in a text."""
     found = {*re.findall(r"(?<![^\W_])[XYZ](?![^\W_])", text)}
     return found.pop() if len(found) == 1 else ""

@@ -213,9 +213,7 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
     problem: NotReadError | None = None
     for blocks, rows in each(grid):
         usable = [
-            row
-            for row in rows
-            if not is_summary(sheet.rows[row]) and not left_out.is_void(sheet.rows[row], "void", "feature")
+            r for r in rows if not is_summary(sheet.rows[r]) and not left_out.is_void(sheet.rows[r], "void", "feature")
         ]
         deviations = left_out.below_deviations(grid, usable)  # beside what they are of
         own = _layout(grid, [row for row in usable if row not in deviations]) if usable else []
@@ -345,7 +343,8 @@ class Understanding:
         unit, of_unit = self.unit(keys, where, reach_mm)
         own, figures, place = self.reading, np.array(self.reading.figures), self.grid.at(self.header.row)
         lengths = lengths_of(figures[:, 0])
-        lines, runs, used = lines_and_runs(own.every_label, lengths, place)
+        stated = [one["place", ""] for one in own.labels]
+        lines, runs, used = lines_and_runs(own.every_label, lengths, place, stated)
         reference, measured = (formats.converted(one, unit, "length_mm") for one in figures.T)
         if own.deviations:
             said_mm = formats.UNITS["mm"] if "deviation_mm" in keys.columns else None
@@ -355,7 +354,6 @@ class Understanding:
                 raise NotReadError(what, where=place, fix=said_by("deviation_um", bare, ", or deviation_mm"))
             turn = turned_by(self.sheets, (c.heading for c in own.taken["deviation_um"]), place)
             measured = reference + formats.converted(figures[:, 1], small, "length_mm") * (-1 if turn else 1)
-        stated = [one["place", ""] for one in own.labels]
         places = stated_places(lines, stated, self.elsewhere, measured.tolist(), unit.up / unit.down, self.grid.sign)
         bare_ = [None if np.isnan(one) else float(one) for one in reference]
         return MeasuredLengths(

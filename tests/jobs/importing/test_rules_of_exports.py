@@ -168,3 +168,11 @@ def test_diameters_of_each_ring_are_lines_of_their_own(head: str, lines: int) ->
     text = f"{head};Richtung;Kalibrierwert (mm);Abweichung 1 (µm);Abweichung 2 (µm);Abweichung 3 (µm)\n"
     found = lengths(text + "\n".join(rows) + "\n")
     assert len({*found.names}) == lines
+
+
+def test_a_number_that_every_row_has_for_itself_counts_no_runs() -> None:
+    rows = [f"E{100 + k};{name};{run};{n};{n + 1e-4 * k:.4f}" for k, (name, run, n) in enumerate(
+        (name, run, n) for name in "AB" for run in (1, 2, 3) for n in NOMINAL)]  # fmt: skip
+    found = lengths("\n".join(["ID_Essai;Ligne;Répétition;Longueur étalonnée [mm];Longueur mesurée [mm]", *rows, ""]))
+    assert found.names == ["A"] * 9 + ["B"] * 9
+    assert found.repeat == [1, 1, 1, 2, 2, 2, 3, 3, 3] * 2

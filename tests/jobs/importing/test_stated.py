@@ -44,7 +44,7 @@ def test_a_date_is_offered_where_it_can_be_read_in_one_way(head: str, day: str |
         ("Temp. ambiente 20,3 C    Temp. campione 20,2 C", "20.3", "20.2"), ("Materialtemperatur: 20,14 °C", None, "20.14"),
         ("Temperature at start (C):,19.8,,Temperature at end (C):,20.1", "", None), ("Temperatur 19,8 °C … 20,3 °C", "", None),
         ("Reference temperature: 20 °C", None, None), ("Bezugstemperatur 20 °C", None, None),
-        ("Teplota stroje 21,3 °C", None, None),
+        ("Teplota stroje 21,3 °C", None, None), ("# temp sphere 20.4", None, "20.4"), ("temp. płyty 20,3 °C", None, "20.3"),
         ("Temperature: 250 °C", None, None), ("Template no. 21", None, None),
         ("温度補正あり。測定値は20℃換算値。", None, None),
     ],
@@ -84,3 +84,10 @@ def test_files_of_every_sort_say_it_in_their_own_way(file: str, expected: dict[s
 
 def test_a_hostile_head_takes_no_long_time_and_says_nothing() -> None:
     assert said("Date: " + "1." * 150 + "\n" + ("temp " * 70 + "\n") * 400 + TABLE) == {}
+
+
+def test_the_serial_number_of_an_instrument_is_not_the_machine_s() -> None:
+    found = said("Maschine;GROB G550;Achse;Y\nMessmittel;Laserinterferometer XL-80;SN;36H917\n" + TABLE)
+    assert (found["machine.name"], found.get("machine.serial")) == ("GROB G550", None)
+    found = said("Maschine;GROB G550;Masch.-Nr.;10-4471\nMessmittel;Laserinterferometer XL-80;SN;36H917\n" + TABLE)
+    assert found["machine.serial"] == "10-4471"

@@ -60,6 +60,9 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     if any(isinstance(cell, str) and _SEVERAL.search(cell) for cell in cells):
         return None  # cells that were not cut apart
     told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
+    above = grid.sheet.rows[: min(taken)]
+    # what stands above a table comes again above each further page of it
+    again = {row for row in range(min(taken), len(grid.sheet.rows)) if grid.sheet.rows[row] in above}
     first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
     for row in range(len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and first <= row < last and row not in heads:
@@ -69,7 +72,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
             text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
             if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
                 told.append(header.shown(grid.sheet, row, header.REMARK))
-        if row in taken or grid.kinds[row] != "figures":
+        if row in taken or row in again or grid.kinds[row] != "figures":
             continue
         figures = [k for k, f in enumerate(grid.figures[row]) if f is not None and (f[1] < 1 or k in columns)]
         within = first <= row < last or 0 < grid.sheet.lines[row] - grid.sheet.lines[last] == row - last  # no gap
@@ -78,7 +81,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
         if figures and within and not known and not _known(grid, row, figures, rows, columns):
             return None
         told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures and row > first else []
-    blank = [cell for one in readings for cell in one.blank]
+    blank = [cell for one in readings for cell in one.blank if cell[0] not in again]
     if any(map(str.isdigit, "".join(grid.text(row, i) for row, i in blank))):
         return None
     places = (grid.sheet.at("", row, i, heading(grid.path(row, i))) for row, i in blank)

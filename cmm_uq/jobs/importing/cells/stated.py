@@ -17,11 +17,21 @@ from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.importing.cells.encodings import decoded, is_number
 from cmm_uq.jobs.importing.format import FileKeys, Format, ImportKeys, format_of
-from cmm_uq.jobs.importing.header import text_of
+from cmm_uq.jobs.importing.header import printed_words, text_of
 
 _FIRST, _LAST, _LONGEST = 300, 60, 400  # lines at both ends that are looked at, and characters of one
 _SHOWN = 90  # characters of the words
 _CELLS = re.compile(r"[\t;|]|\s{2,}|\"?,\"|,(?!\d)|(?<!\d),")
+_WORDS = {name: "|".join(parts) for name, parts in printed_words("stated").items()}
+_MONTHS = _WORDS["months"].split("|")
+_WHOLE = r"(?<![^\W_])(?:{})\.?(?![^\W_])|{}"  # a word by itself, or a part of one
+_DAY, _SERIAL = (re.compile(_WHOLE.format(_WORDS[name], _WORDS[f"{name}_within"])) for name in ("day", "serial"))
+_OTHER_DAY, _WARMTH, _NO_WARMTH, _OF_ARTEFACT, _OF_SCALE, _OF_INSTRUMENT = (
+    re.compile(_WORDS[name]) for name in ("other_day", "warmth", "no_warmth", "artefact", "scale", "instrument")
+)
+_MACHINE = re.compile(
+    rf"^\W*(?:measuring |mess|mer)?(?:{_WORDS['machine']})(?: model| type| name)?\s*(?P<rest>[:=.].*)?$"
+)
 _DATES = (
     re.compile(r"(?<!\d)(?P<y>(?:19|20)\d\d)\s?[-/.年년]\s?(?P<m>\d{1,2})\s?[-/.月월]\s?(?P<d>\d{1,2})(?!\d)"),
     re.compile(r"(?<!\d)(?P<d>\d{1,2})(?P<sign>\.|\. |/|-)(?P<m>\d{1,2})(?P=sign)(?P<y>(?:19|20)\d\d)(?!\d)"),
@@ -30,46 +40,10 @@ _DATES = (
     re.compile(r"(?<!\d)(?P<y>20\d\d)(?P<m>\d\d)(?P<d>\d\d)(?!\d)"),
 )
 _ODD_DATE = re.compile(r"(?<!\d)\d{1,2}[-/.]\d{1,2}[-/.]\d\d(?!\d)")
-_MONTHS = (
-    *("jan led sty oca gen ene", "feb fev uno lut sub", "mar mrt maa bre mae", "apr avr dub kwi nis abr"),
-    *("may mai maj mei mag kve", "jun jui giu cer cze haz", "jul lug cve lip tem", "aug aou ago srp sie"),
-    *("sep set zar wrz eyl", "oct okt out ott rij paz", "nov lis kas", "dec dez dic pro gru ara"),
-)
-_DAY = re.compile(
-    r"(?<![^\W_])(?:date|datum|data|fecha|dato|tarih|dne|pvm|paivays|paivamaara|дата|day|tag|startinspectiontime|k0004)(?![^\W_])"
-    r"|日付|日期|年月日|[測检検测]\w?日|(?:측정|점검|검사|교정)일|날짜|일자|\bgemessen am\b"
-)
-_OTHER_DAY = re.compile(
-    r"cert|zert|schein|due\b|valid|gultig|next|expir|bis\b|证书|証明|свид|св-во|platn|geldig|version|erstellt|edition"
-)
-_WARMTH = re.compile(r"temp(?:\b|[._ (]|erat)|teplot|homers|sicaklik|lampotil|температур|温度|온도|室温|omgeving\b")
-_NO_WARMTH = re.compile(
-    r"referen|bezug|riferim|\bnominal|limit|\b(?:bei|at|auf|na|bij|a|ved|vid) 20\b|koef|coef|expans|rated|zulass"
-    r"|基準|換算|humid|press"
-)
-_OF_ARTEFACT = re.compile(
-    r"artef|part\b|piece|pezzo|pieza|peca|werkst|normal\b|endmass|platte|plate|gauge|gage|materia|\bmat\b|calibro|campione|mere?k|mer(?=id)|bloq|block"
-    r"|etalon|wzorc|standard\b|objekt|kugel|stab|bar\b|desky|工件|标准器|标准器|標準器|ワーク|材料|재료|块|ゲージ|공작물|эталон|plaque"
-)
-_OF_SCALE = re.compile(
-    r"scale|massst|regl|riga\b|scala|skal|machin|maschin|macchin|maquin|stroj|maszyn|(?<![^\W_])[xyz]\b|光栅|스케일|スケール|шкал"
-)
 _FIGURE = re.compile(r"(?<![\d.,±/])[-+]?\d{1,3}(?:[.,]\d{1,3})?(?![\d.,]*\d)")
 _FAHRENHEIT = re.compile(r"°\s?f\b|\(f\)|\bdegf\b|\d\s?f\b", re.IGNORECASE)
 _COLDEST, _WARMEST = 10.0, 40.0  # °C, of rooms where machines are calibrated
-_MACHINE = re.compile(
-    r"^\W*(?:measuring |mess|mer)?(?:machine|maschine|macchina|maquina|maszyna|stroj|gep|mmt|cmm|kmg|tezgah|maskin"
-    r"|kone|gerat|pruefling"
-    r"|cihaz|instrument|equipo|машина|ким|机器|仪器型号|设备型号|機械|機種|測定機|장비|기계)"
-    r"(?: model| type| name)?\s*(?P<rest>[:=.].*)?$"
-)
 _DEVICE = re.compile(r"\bDMEID\s*/\s*'([^']{3,60})'")
-_SERIAL = re.compile(
-    r"(?<![^\W_])(?:s/n|n/s|sn|serial(?: n(?:o|umber|r))?|ser\.? ?no|seriennr|serien-nr|fab[rn]?\.?-? ?nr|nr fabr"
-    r"|matr(?:icola)?|n[o°º] ?(?:de )?serie"
-    r"|no serie|tillv\.? ?nr|зав\. ?(?:№|no|n)|зав|v\. ?c|vyr\. ?c|gyari szam|seri no)\.?(?![^\W_])"
-    r"|出厂编号|出廠編號|製造番号|器番|機番"
-)
 _OF_SERIAL = re.compile(r"[\s:.№#=]*([\w][\w./-]*(?: \d[\w.-]*)?)")
 _LIMIT = re.compile(
     r"(?<![\d.,])\d{1,2}(?:[.,]\d{1,3})?\s?\+\s?(?:\d{1,2}(?:[.,]\d{1,3})?\s?[*·×]?\s?)?L\s?/\s?\d{2,4}(?![.,\d])"
@@ -264,7 +238,7 @@ def _machines(lines: Sequence[Line]) -> Iterator[Offer]:
         yield Offer("machine.name", name[:_SHOWN], _short(text), number)
         for line, own, near in lines[place : place + 3]:
             beside = [*_valued(near[k:] if line == number else near, _SERIAL)]
-            if line != number and _OF_ARTEFACT.search(_folded(own)):
+            if line != number and any(one.search(_folded(own)) for one in (_OF_ARTEFACT, _OF_INSTRUMENT)):
                 continue
             token = _OF_SERIAL.match(beside[0][1]) if beside else None
             if token is not None and re.search(r"\d", token[1]):

@@ -34,7 +34,7 @@ _NAME = "Name the columns by what they are: nominal_mm, reference_mm, length_mm,
 
 def lengths_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
     """Lengths of rows below one head: ``None`` where there are none; what is left open is an error that asks."""
-    for i, path in enumerate(blocks[0].paths):
+    for i, path in enumerate(blocks[0].paths if not grid.placed(rows) else ()):
         if {*"XYZ"} <= {grid.text(row, i) for row in rows} and hint(heading(path), lengths=True) != "line":
             return None  # coordinates of a report, one a row
     columns = columns_in(grid, blocks, rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -13,7 +14,9 @@ from cmm_uq.jobs.importing.factors import LINE, POINT, RUN, Counted, Label, code
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import plain_words, words_of
 from cmm_uq.jobs.importing.lengths.places import says_figures
+from cmm_uq.jobs.importing.lines import letter_in
 
+_PLACED = re.compile(r"\w+ \([^()]*;[^()]*\)")  # figures of columns of starts, ends and directions
 _FEW = 4  # references that may differ by chance
 
 
@@ -29,8 +32,10 @@ def lengths_of(references: Floats) -> Ints:
     return near
 
 
-def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tuple[list[str], Ints, list[str]]:
-    """Name of the line and number of the run of each length, and by what labels; an error asks where nothing says."""
+def lines_and_runs(
+    labels: Sequence[Label], reference: Ints, place: str, stated: Sequence[str] = ()
+) -> tuple[list[str], Ints, list[str]]:
+    """Name of the line and number of the run of each length, and by what labels; ``stated``: what may say where it lies."""
     count, several, found = len(reference), bool(reference.max(initial=0) > 0), factors.varying(labels, lengths=True)
     of_lines = {f[0].sort for f in found if f[2] == LINE and not (several and fixes(reference, f[1]))}
     for k, (label, own, _) in enumerate(found if {"title", "column"} & of_lines else ()):
@@ -38,11 +43,13 @@ def lines_and_runs(labels: Sequence[Label], reference: Ints, place: str) -> tupl
             found[k] = label, own, RUN  # M1, M2 are measurements of the line that is named
     found = [(f[0], f[1], RUN if _measurements(f, found) else f[2]) for f in found]
     found = [(f[0], f[1], LINE if f[2] is None and _says_places(f[0]) else f[2]) for f in found]
+    lying = codes([*map(str, map(_PLACED.findall, stated))]) if stated else reference
+    found = [(f[0], f[1], LINE if stated and _is_of(f, lying) else f[2]) for f in found]
     above = [f for f in found if f[0].sort in ("title", "sheet", "block") and not fixes(f[1], reference)]
     # numbers of the lengths of each line, though they are called positions
     found = [(f[0], f[1], POINT) if f[0].sort == "column" and _counts_them(f, above, reference) else f for f in found]
     plain = [f for f in found if not (several and (fixes(reference, f[1]) or f[1].max() + 1 == count))]
-    run = _one_run(labels, [f for f in found if f[2] == RUN and not (several and fixes(reference, f[1]))], place)
+    run = _one_run(labels, [f for f in plain if f[2] == RUN], place)
     line: list[Counted] = []
     called = [f for f in plain if f[2] == LINE]
     for one in sorted(called, key=lambda f: (several and fixes(f[1], reference), f[0].sort == "part", -f[1].max())):
@@ -85,8 +92,16 @@ def _measurements(one: Counted, others: Sequence[Counted]) -> bool:
 
 
 def _says_places(label: Label) -> bool:
-    """Whether titles or cells are of lines, for they say where one lies."""
-    return label.sort in ("title", "column") and any(map(says_figures, {*label.values}))
+    """Whether titles or cells are of lines, for they say where one lies, or parts of names, for each says an axis."""
+    values = {*label.values}
+    if label.sort == "part":
+        return len(axes := {*map(letter_in, values)}) > 1 and "" not in axes
+    return label.sort in ("title", "column") and any(map(says_figures, values))
+
+
+def _is_of(one: Counted, lying: Ints) -> bool:
+    """Whether each value of a column stands beside one place, and each place beside one value."""
+    return one[2] != RUN and one[0].sort == "column" and fixes(one[1], lying) and fixes(lying, one[1])
 
 
 def _counts_them(column: Counted, above: Sequence[Counted], reference: Ints) -> bool:
@@ -129,19 +144,15 @@ def _told_apart(
         rows = bool(line) and _digits(one[0]) and reference.max() > 0 and fixes(one[1], reference)
         if rows or apart() == count or apart(one[1]) == apart():
             continue
-        if one[0].sort == "part" and line and run is None and {*one[0].values} <= {*"abcdefgh"}:
-            raise NotReadError("letters in names may be of runs or lines", where=place, fix="Number runs in a column")
-        if (
-            one[0].sort == "part"
-            and line
-            and run is None
-            and one[2] is None
-            and not _digits(one[0])
-            and _crossed(one, line)
-        ):
-            what = f"{one[0].values[0]!r} in names may count runs, or lines"
-            fix = 'Say so with a word for a run ahead of each number, as in "Run 1"'
-            raise NotReadError(what, where=place, fix=fix)
+        if one[0].sort == "part" and line and run is None:
+            if {*one[0].values} <= {*"abcdefgh"}:
+                raise NotReadError(
+                    "letters in names may be of runs or lines", where=place, fix="Number runs in a column"
+                )
+            if one[2] is None and not _digits(one[0]) and _crossed(one, line):
+                what = f"{one[0].values[0]!r} in names may count runs, or lines"
+                fix = 'Say so with a word for a run ahead of each number, as in "Run 1"'
+                raise NotReadError(what, where=place, fix=fix)
         whole = run is not None and apart(one[1]) == (reference.max() + 1) * (one[1].max() + 1) * (run[1].max() + 1)
         unsaid = any(f[2] is None for f in line) and one[2] is None and one[0].sort == "column"
         if run is None and (named or lined) and _digits(one[0]):

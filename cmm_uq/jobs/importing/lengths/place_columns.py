@@ -57,11 +57,8 @@ def _directions(grid: CutSheet, block: Block, columns: Sequence[int]) -> list[in
     for i in columns if len(columns) > len("XYZijk") else ():
         three = np.column_stack([grid.column(block.rows, k)[0] for k in range(i, min(i + 3, grid.width))])
         three = three[np.isfinite(three).any(axis=1)]
-        if (
-            three.shape[1:] == (3,)
-            and len(three)
-            and bool((np.abs(np.linalg.norm(three, axis=1) - 1) < _UNIT_VECTOR).all())
-        ):
+        whole = three.shape[1:] == (3,) and len(three) > 0
+        if whole and bool((np.abs(np.linalg.norm(three, axis=1) - 1) < _UNIT_VECTOR).all()):
             return [i, i + 1, i + 2]
     return []
 
