@@ -41,6 +41,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Workers of one run share what takes long to make: see tests/artefacts/simulated.py."""
     os.environ["CMM_UQ_RECORDS"] = "none"  # what is tested of records names them
+    os.environ["CMM_UQ_DATES"] = "none"
     gc.disable()  # nothing of what is collected goes again
     if hasattr(config, "workerinput"):
         os.environ["CMM_UQ_TESTS_SHARE"] = str(Path(config.option.basetemp).parent)

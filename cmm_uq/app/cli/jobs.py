@@ -158,46 +158,37 @@ def import_export(
     json: bool = flag(False, "--json", "Print what is recognised as JSON."),
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
-    from cmm_uq.app.commands.jobs.exchange import (
-        amounts,
-        example,
-        lines_asked,
-        offered,
-        placed_by_plan,
-        read_export,
-        remember,
-        remembered_keys,
-        write_recording,
-    )
+    from cmm_uq.app.commands.jobs import exchange
 
-    keys, known = remembered_keys(file, import_keys(column, key, line))
+    keys, known = exchange.remembered_keys(file, import_keys(column, key, line))
     silent = quiet or json
     if known and not silent:
         say(f"As remembered in {known}")
     try:
         with in_options():
-            keys = keys if plan is None else placed_by_plan(file, keys, plan)
-            export = read_export(file, keys)
+            keys = keys if plan is None else exchange.placed_by_plan(file, keys, plan)
+            export = exchange.read_export(file, keys)
     except CmmUqError as error:
-        asked = lines_asked(error)
+        asked = exchange.lines_asked(error)
         if save_as and asked is not None and asked[0] is not None:
-            remember(save_as, keys, asked[0].head)
+            exchange.remember(save_as, keys, asked[0].head)
         if asked is not None and not silent:
             show_proposed(*asked)
-            show_offered(offered(file, keys))
+            show_offered(exchange.offered(file, keys))
         raise
     if save_as:
-        remember(save_as, keys, export.recognised.head)
+        exchange.remember(save_as, keys, export.recognised.head)
     if json:
-        stated = {one.key: {"value": one.value, "words": one.words, "line": one.line} for one in offered(file, keys)}
+        offered = exchange.offered(file, keys)
+        stated = {one.key: {"value": one.value, "words": one.words, "line": one.line} for one in offered}
         put(json_text.dumps({**export.recognised.data, "stated": stated}, indent=2, ensure_ascii=False) + "\n")
     elif not quiet:
         show_recognised(export.recognised)
-        show_offered(offered(file, keys))
-        say(f"Read: {amounts(export)}; the first {example(export)}")
+        show_offered(exchange.offered(file, keys))
+        say(f"Read: {exchange.amounts(export)}; the first {exchange.example(export)}")
         say("Another column: --column x_mm=3. The answers for the next export of this kind: --save-as NAME")
     if out is not None:
-        write_recording(file, export, out)
+        exchange.write_recording(file, export, out)
         if not (quiet or json):
             say(str(out))
 

@@ -11,15 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.app.commands.jobs.exchange import (
-    amounts,
-    lines_asked,
-    offered,
-    placed_by_plan,
-    proposed,
-    remember,
-    remembered_keys,
-)
+from cmm_uq.app.commands.jobs import exchange
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import TABLE_BYTES, content_of
 from cmm_uq.base.points import Machine
@@ -36,7 +28,7 @@ IGNORED, UNKNOWN = "ignored", "unknown"
 
 def first_keys(path: str) -> dict[str, Any]:
     """Keys with which an export is first read: those that are remembered of its format."""
-    return remembered_keys(Path(path), ImportKeys())[0].model_dump(exclude_defaults=True)
+    return exchange.remembered_keys(Path(path), ImportKeys())[0].model_dump(exclude_defaults=True)
 
 
 def remembered(path: str, keys: Mapping[str, Any]) -> str:
@@ -50,7 +42,7 @@ def remembered(path: str, keys: Mapping[str, Any]) -> str:
             f"is remembered as {known[0].stem} already", where=Path(path).name, fix=f"Remove {known[0]} first"
         )
     own.unlink(missing_ok=True)
-    remember(name, said, head)
+    exchange.remember(name, said, head)
     return name
 
 
@@ -67,25 +59,18 @@ def keys_of(data: Mapping[str, Any]) -> ImportKeys:
 def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """The whole reading of an export, as a page shows it; what is wrong with it is part of it."""
     name, content, said = Path(path).name, content_of(Path(path), TABLE_BYTES, "Drop it again"), keys_of(keys)
-    found: dict[str, Any] = {
-        "name": name,
-        "command": command(name, said),
-        "problem": None,
-        "lines": {},
-        "example": "",
-        "amounts": "",
-        "facts": [],
-        "stated": [[str.__str__(text) for text in one.row] for one in offered(Path(path), said)],
-        "doubtful": [],
-    }
+    stated = [[str.__str__(text) for text in one.row] for one in exchange.offered(Path(path), said)]
+    found: dict[str, Any] = {"name": name, "command": command(name, said), "problem": None, "lines": {}, "facts": []}
+    found |= {"example": "", "amounts": "", "stated": stated, "doubtful": []}
     recognised: Recognition | None = None
     try:
         table = imported(content, name, said)
         points_of(table.columns, table.lines.tolist(), name, Machine())
-        recognised, found["example"], found["amounts"] = table.recognised, example(table), amounts(table)
-        found["lines"] = {line: (*proposed(place), "") for line, place in table.places.items()}
+        recognised, found["example"] = table.recognised, example(table)
+        found["amounts"] = exchange.amounts(table)
+        found["lines"] = {line: (*exchange.proposed(place), "") for line, place in table.places.items()}
     except CmmUqError as error:
-        if (asked := lines_asked(error)) is not None:
+        if (asked := exchange.lines_asked(error)) is not None:
             recognised, found["example"], found["lines"] = asked
         found["problem"] = [error.where or "", error.problem, error.fix or ""]
     found["lines"] = [(line, *own) for line, own in found["lines"].items()]
@@ -182,7 +167,7 @@ def corrected(path: str, keys: Mapping[str, Any], chosen: Mapping[str, str], sai
         others["points_per_measurement"] = int(points)
     after = keys_of({"columns": columns, "lines": lines, **others})
     if said.get("plan"):
-        after = placed_by_plan(Path(path), after, Path(said["plan"]))
+        after = exchange.placed_by_plan(Path(path), after, Path(said["plan"]))
     return after.model_dump(exclude_defaults=True)
 
 

@@ -13,7 +13,7 @@ which is what makes one machine's figures comparable with another's: docs/record
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -248,6 +248,7 @@ def limit_for(limit: float | None, u: Floats) -> float:
     return float(limit) if limit else WITHOUT_LIMIT * float(np.median(u))
 
 
+@lru_cache(maxsize=100)
 def default_prior(unit: float, nodes: int = NODES, *, plain: bool = False) -> DriftPrior:
     """Of a machine without a fleet, in units of the limit; ``plain``: without wear that speeds up, settling and season."""
     number = normal_lattice(nodes + len(FAST), len(NAMES) - 3 + len(ALONE))

@@ -126,22 +126,16 @@ def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on:
     last, released = done[-1], [one for one in done if one.state == "released"]
     waits = last.state == "draft" and bool(released)
     if last.state == "draft":
-        remarks.append(
-            say(
-                "Its certificate of {day} is a draft that nobody has released: it begins no interval.",
-                day=day(last.day),
-            )
-            if waits
-            else say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day))
-        )
+        at = day(last.day)
+        none = say("Its certificate of {day} is a draft that nobody has released: it begins no interval.", day=at)
+        remarks.append(none if waits else say("Its certificate of {day} is a draft that nobody has released.", day=at))
     if not of.limited:
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
     elif last.decision not in (*BEYOND, NONE, "pass"):
         decision = Verbatim(last.decision)
         remarks.append(say("Its last certificate does not state that it conforms: {decision}.", decision=decision))
-    every = [
-        one for one in (*machine.adjusted, *(one.adjusted_since for one in known)) if one is not None and one <= on
-    ]
+    stated = (*machine.adjusted, *(one.adjusted_since for one in known))
+    every = [one for one in stated if one is not None and one <= on]
     adjusted = [one for one in every if last.day < one]
     due, reason, beyond = _due_date(of, last, adjusted, pool)
     counts = last

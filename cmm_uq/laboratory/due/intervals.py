@@ -19,7 +19,10 @@ limits falls to the target. Source: suncal 1.7.1 and its tests, which quote NASA
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from hashlib import sha256
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import scipy
@@ -235,9 +238,21 @@ def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Serie
     ])  # fmt: skip
 
 
+DriftInterval = tuple[float, str, bool]
+KNOWN: dict[str, DriftInterval] = {}
+"""What was found by drift, by the hash of what it came from, for whoever keeps it: only new histories take time then."""
+
+
+@cache
+def _program() -> str:
+    """What computes them: another program may come to other days."""
+    sources = b"".join(file.read_bytes() for file in sorted(Path(__file__).parent.glob("*.py")))
+    return f"{sha256(sources).hexdigest()} {np.__version__} {scipy.__version__}"
+
+
 def drift_interval(
     certificates: Sequence[RecordedCertificate], reliability: float, priors: Mapping[str, DriftPrior]
-) -> tuple[float, str, bool]:
+) -> DriftInterval:
     """Days from the last calibration until the first of the errors may have crossed its limit, and which one it is.
 
     Infinite beyond the model's horizon; last, whether its prior is a fleet's. Interim checks count: the model takes all that
@@ -260,7 +275,7 @@ def drift_interval(
             continue
         together.setdefault((own.day[-1], learnt, i // _AT_ONCE), []).append((one, own, limit if learnt else 1.0))
     begin, part = last.day.toordinal(), 1 - reliability
-    found: list[tuple[float, str, bool]] = []
+    found: list[DriftInterval] = []
     for (day, learnt, _), each in together.items():
         machines, prior = side_by_side([own for _, own, _ in each]), priors.get(learnt) or default_prior(1.0)
         until = min(found, default=(HORIZON * YEAR,))[0] + begin - day + 1
@@ -355,7 +370,9 @@ def _control_chart(
 
 
 def _drift(rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
-    length, name, learnt = drift_interval(certificates, rule.reliability, priors)
+    key = sha256(repr((_program(), certificates, rule.reliability)).encode()).hexdigest()
+    kept: dict[str, DriftInterval] = {} if priors else KNOWN  # a fleet learns with every entry
+    length, name, learnt = kept[key] = kept.get(key) or drift_interval(certificates, rule.reliability, priors)
     why = say("{model}: {name} has not crossed its limit with {target} % for {reached}", name=Verbatim(name),
               model=say("drift model with its fleet") if learnt else say("drift model without a fleet"),
               target=_percent(rule.reliability), reached=_lasting(length))  # fmt: skip

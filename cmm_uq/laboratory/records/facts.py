@@ -285,17 +285,9 @@ class MeasuredPart:
         entry: int = 0,
     ) -> MeasuredPart:
         """As files and entries state it, with ``None`` for what they leave open."""
-        return cls(
-            dt.date.fromisoformat(day),
-            dt.date.fromisoformat(calibrated),
-            folder,
-            str(number),
-            str(part["name"] or ""),
-            str(part["serial"] or ""),
-            str(certificate or ""),
-            str(outcome or ""),
-            entry,
-        )
+        days = dt.date.fromisoformat(day), dt.date.fromisoformat(calibrated)
+        name, serial, by, found = (str(one or "") for one in (part["name"], part["serial"], certificate, outcome))
+        return cls(*days, folder, str(number), name, serial, by, found, entry)
 
 
 @dataclass(frozen=True, slots=True)

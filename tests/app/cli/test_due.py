@@ -6,13 +6,16 @@ import datetime as dt
 import json
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from cmm_uq.app.commands.laboratory.due import WhatIsDue, what_is_due
+from cmm_uq.laboratory.due import intervals
 from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.records.facts import RecordedCertificate
 from tests.app.cli.process import run
 from tests.laboratory.records.histories import certificate, moment
 
@@ -368,3 +371,45 @@ def test_a_history_without_a_picture_waits_for_nothing_that_draws_or_fits() -> N
     code = f"import sys, cmm_uq.app.commands.laboratory.due; print([m for m in {heavy} if m in sys.modules])"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
+
+
+DRIFTS = {"calibrate": {"method": "drift", "reliability": 0.95, "every_months": 12}}
+
+
+def test_a_date_by_drift_is_found_anew_only_where_the_history_has_new_entries(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And stands in for the whole computation: what is kept gives the same list, reasons included."""
+    found: list[str] = []
+    whole = intervals.drift_interval
+    values = [("scale_x.ppm", "Scale error of x", "ppm", 2.0, 0.5, 1.0, 3.0, 0.2, 8.0)]
+
+    def counted(certificates: Sequence[RecordedCertificate], *given: Any) -> intervals.DriftInterval:
+        found.append(certificates[-1].machine)
+        return whole(certificates, *given)
+
+    def due(file: Path | str) -> tuple[WhatIsDue, list[str]]:
+        found.clear()
+        monkeypatch.setenv("CMM_UQ_DATES", str(file))
+        monkeypatch.setattr(intervals, "KNOWN", {})  # as in a new process
+        return what_is_due(place, on=dt.date.fromisoformat(ON)), sorted(found)
+
+    def of(serial: str, day: str) -> dict[str, Any]:
+        return certificate(serial, dt.date.fromisoformat(day), values, machine=machine(serial, **DRIFTS))
+
+    monkeypatch.setattr(intervals, "drift_interval", counted)
+    place = recorded(tmp_path, *(of(serial, day) for day in ("2024-03-04", "2025-03-03") for serial in "ABC"))
+    file = tmp_path / "cache" / "dates.json"
+    first = due(file)
+    assert first[1] == ["A", "B", "C"]
+    assert due(file) == (first[0], [])
+    with open_records(place) as records:
+        records.append_all([("report", of("B", "2026-03-02"), moment(dt.date(2026, 3, 2)))])
+    second = due(file)
+    assert second[1] == ["B"]
+    assert second[0] != first[0]
+    assert second[0] == due("none")[0]
+    for damaged in ("[", "[1]", '{"a": 1}', '{"a": [NaN, "", true]}'):
+        file.write_text(damaged, encoding="utf-8")
+        assert due(file) == (second[0], ["A", "B", "C"])
+    assert due(file) == (second[0], [])

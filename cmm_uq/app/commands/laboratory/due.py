@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import datetime as dt
 import json
+import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -14,7 +16,7 @@ import numpy as np
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of
+from cmm_uq.base.files.limits import MODEL_BYTES, TABLE_BYTES, check_permitted, content_of
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.laboratory.due.doubt import parts_measured, with_parts
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
@@ -23,6 +25,7 @@ from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibratio
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine
 from cmm_uq.laboratory.records.listing import outcomes_of
+from cmm_uq.laboratory.records.place import NONE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,9 +124,33 @@ def due_in(
     if not asked and not artefacts:
         raise CmmUqError("no machine is recorded yet", where="records", fix="Record one: cmm-uq report JOB")
     reading = _Reading(records, on, fleets, whole=bool(machines))
-    found = [machine_due(reading.known(one), artefacts, on, reading.pool(one)) for one in asked]
+    with _kept_intervals() if any(Rule.of(one.calibrate).method == "drift" for one in asked) else nullcontext():
+        found = [machine_due(reading.known(one), artefacts, on, reading.pool(one)) for one in asked]
     used = {one.artefact for one in found} if machines else set(artefacts)
     return in_order([*found, *(artefact_due(artefacts[serial]) for serial in used if serial in artefacts)])
+
+
+@contextmanager
+def _kept_intervals() -> Iterator[None]:
+    """Intervals by drift as they were found of the same histories, in a file; one that fails costs time alone.
+
+    It is ``CMM_UQ_DATES``, or ``~/.cache/cmm-uq/dates.json``, or ``none``; one beyond what is read of a file is begun anew.
+    """
+    from cmm_uq.laboratory.due.intervals import KNOWN
+
+    file = Path(os.environ.get("CMM_UQ_DATES") or "~/.cache/cmm-uq/dates.json")
+    with suppress(CmmUqError, ValueError, TypeError, AttributeError, RuntimeError):
+        kept = json.loads(content_of(file.expanduser(), MODEL_BYTES, "")) if str(file) != NONE else {}
+        found = {key: (days, f"{name}", learnt is True) for key, (days, name, learnt) in kept.items() if days >= 0}
+        KNOWN.update(found)
+    before = len(KNOWN)
+    yield
+    with suppress(OSError, RuntimeError):
+        if len(KNOWN) > before and str(file) != NONE:
+            (file := file.expanduser()).parent.mkdir(parents=True, exist_ok=True)
+            own = file.with_name(f"{file.name}.{os.getpid()}")
+            own.write_text(json.dumps(KNOWN), encoding="utf-8")
+            own.replace(file)
 
 
 class _Reading:
@@ -135,19 +162,15 @@ class _Reading:
 
     def __init__(self, records: Records, on: dt.date, fleets: Mapping[str, FleetPrior], *, whole: bool) -> None:
         self.records, self._on, self._fleets, self._late = records, on, fleets, records.dated_after(on)
-        self._newest: dict[str, RecordedCertificate] = {}
-        self._released: dict[str, RecordedCertificate] = {}
-        self._checked: dict[str, RecordedCertificate] = {}
-        self._without: set[int] = set()
         self._pasts: dict[str, list[RecordedCertificate]] = {}
         self._pools: dict[tuple[str, str], list[CompletedInterval]] = {}
-        if not whole:
-            self._newest = {one.machine: one for one in records.latest(on, values=False)}
-            released = records.latest(on, values=False, states=("released",))
-            self._released = {one.machine: one for one in released}
-            self._checked = {one.machine: one for one in records.checks() if one.day <= on}
-            undecided = [one.entry for one in self._newest.values() if one.decision == "none"]
-            self._without = set(undecided) - records.limited(undecided)
+        newest = [] if whole else records.latest(on, values=False)
+        released = [] if whole else records.latest(on, values=False, states=("released",))
+        checked = [] if whole else [one for one in records.checks() if one.day <= on]
+        each = ({one.machine: one for one in of} for of in (newest, released, checked))
+        self._newest, self._released, self._checked = each
+        undecided = [one.entry for one in newest if one.decision == "none"]
+        self._without = set(undecided) - records.limited(undecided)
 
     def known(self, machine: RecordedMachine) -> CalibrationRecord:
         """What its rule needs of a machine: its newest certificate where that will do."""
