@@ -17,6 +17,7 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.planning.setting import Setting
+from cmm_uq.app.cli import lighten
 from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.files import REPORTS, Form, Stage, Written, silent
@@ -338,4 +339,5 @@ def _rounded(value: float) -> float | None:
 
 
 if __name__ == "__main__":
+    lighten()
     serve(begin)

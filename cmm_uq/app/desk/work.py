@@ -22,6 +22,7 @@ import numpy as np
 import tomlkit
 
 from cmm_uq.analysis.diagnosis.location import residual_field
+from cmm_uq.app.cli import lighten
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.jobs.new import check_empty, job_id, put_new
@@ -203,4 +204,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    lighten()
     main()

@@ -14,17 +14,7 @@ from cmm_uq.analysis.machine.correction import FieldMap, field_map
 from cmm_uq.analysis.machine.rotary_correction import RotaryCorrection
 from cmm_uq.app.commands.certificates.further import together_of
 from cmm_uq.app.commands.files import Stage, silent
-from cmm_uq.app.commands.jobs.compensate_rotary import (
-    ROTARY_FILES,
-    RotaryCloud,
-    RotaryCompensation,
-    error_files,
-    errors_found,
-    estimated,
-    in_words,
-    worth_data,
-    worth_in_words,
-)
+from cmm_uq.app.commands.jobs import compensate_rotary
 from cmm_uq.app.commands.jobs.simulate import recording
 from cmm_uq.app.commands.model import refuse_planned
 from cmm_uq.app.commands.reading import job_of, read_job, read_machine
@@ -69,7 +59,7 @@ def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict
     ``beyond``: ``refuse`` points outside the maps, or extrapolate and flag them.
     """
     refuse_planned(job)
-    compensation = RotaryCompensation.of(job, beyond)
+    compensation = compensate_rotary.RotaryCompensation.of(job, beyond)
     _refuse_map(job, job.points)
     if not job.facts.artefact.with_recording:
         raise kind_of(job).refused("compensated")
@@ -127,12 +117,14 @@ def write_new_map(
     refuse_planned(read)
     owner = Owner("compensate", read.facts.job.id, read.origin)
     rotary = _is_rotary(read)
-    names = ROTARY_FILES if rotary else (NEW_MAP, COVARIANCE, MAP_KEYS)
+    names = compensate_rotary.ROTARY_FILES if rotary else (NEW_MAP, COVARIANCE, MAP_KEYS)
     with staged(out, owner, inputs=read.paths, force=force, expected=(*names, PROVENANCE)) as place:
         if rotary:
-            errors = errors_found(read, seed, stage)
-            return place.write(error_files(read, errors, _made_of(read, "file of errors"), PROVENANCE)), errors
-        result, observe = estimated(read, "made an error map of", seed, stage)
+            errors = compensate_rotary.errors_found(read, seed, stage)
+            return place.write(
+                compensate_rotary.error_files(read, errors, _made_of(read, "file of errors"), PROVENANCE)
+            ), errors
+        result, observe = compensate_rotary.estimated(read, "made an error map of", seed, stage)
         try:
             with physics_of(read):
                 together = together_of(read, result.model, result.posterior, result.doubt, seed)()
@@ -150,8 +142,8 @@ def write_new_map(
 def worth_of(found: FieldMap | RotaryCorrection) -> list[str]:
     """What a new map is good for, in sentences for who made it."""
     if isinstance(found, RotaryCorrection):
-        return in_words(found)
-    lines = worth_in_words("In the measuring range", found.range_um, found.held_out, "map")
+        return compensate_rotary.in_words(found)
+    lines = compensate_rotary.worth_in_words("In the measuring range", found.range_um, found.held_out, "map")
     lines += [str(text) for text in readings_warnings(found.statements, {})]
     if found.omitted:
         lines.append(f"Neither in the map nor in its uncertainty: {', '.join(found.omitted)}")
@@ -174,7 +166,7 @@ def _map_files(read: Job, found: FieldMap, further: FurtherCertificates) -> dict
         "sign": "true = indicated + e", "errors_not_in_it": list(found.omitted),
         **({"axes": readings_data(read.points.machine, found.statements)} if found.statements else {}),
         **further_data(further.each),
-        **worth_data(found.range_um, found.held_out),
+        **compensate_rotary.worth_data(found.range_um, found.held_out),
     }  # fmt: skip
     return {
         NEW_MAP: (_made_of(read) + error_map_csv(error_map)).encode(),
@@ -233,7 +225,7 @@ def _refuse_map(job: Job, points: Points | None = None) -> None:
 def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, bytes]:
     """Every file of the compensated job; ``text`` are maps written in the contractors' form."""
     points, provenance = compensate_job(read, beyond=beyond)
-    compensation = RotaryCompensation.of(read, beyond)
+    compensation = compensate_rotary.RotaryCompensation.of(read, beyond)
     if compensation.has_uncertainty:
         probe = _prepared(read, compensation)
         u = compensation.standard_uncertainty(probe) / MICROMETRE
@@ -255,7 +247,7 @@ def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, by
     return {"job.toml": toml, **files}
 
 
-def _prepared(job: Job, compensation: RotaryCompensation) -> Points:
+def _prepared(job: Job, compensation: compensate_rotary.RotaryCompensation) -> Points:
     """The recording, with tip offsets where its kind finds them from what it recorded."""
     facts, points = job.facts.artefact, compensation.prepared(job.points, job.recording_path)
     if not facts.carries_probe or "tip_x_mm" in job.points.columns:
@@ -330,14 +322,14 @@ class _WithUncertainty:
         return self._sample.distances(self._map, self._covariance, self._letters)
 
 
-def _of_rotary(read: Job, cloud: Path, beyond: Beyond) -> tuple[RotaryCloud, dict[str, object]]:
+def _of_rotary(read: Job, cloud: Path, beyond: Beyond) -> tuple[compensate_rotary.RotaryCloud, dict[str, object]]:
     """How a cloud of a machine with rotary axes is corrected, and what is said of it."""
     if read.facts.machine.digitizer is not None:
         fix = "Leave it out, and give the cloud as x_mm, y_mm, z_mm with the angles"
         what = "a digitizer on a machine with rotary axes is not described"
         raise CmmUqError(what, where="job.toml [machine] digitizer", fix=fix)
-    compensation = RotaryCompensation.of(read, beyond)
-    return RotaryCloud(read, compensation, cloud_header(cloud), str(cloud)), compensation.provenance()
+    compensation = compensate_rotary.RotaryCompensation.of(read, beyond)
+    return compensate_rotary.RotaryCloud(read, compensation, cloud_header(cloud), str(cloud)), compensation.provenance()
 
 
 def _of_digitizer(

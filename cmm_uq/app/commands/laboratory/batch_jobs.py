@@ -17,6 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from cmm_uq.app.cli import lighten
 from cmm_uq.app.commands.files import RESULTS, called
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
@@ -168,4 +169,5 @@ def _type(module: Any, kind: str) -> Any:
 
 
 if __name__ == "__main__":
+    lighten()
     serve(begin)
