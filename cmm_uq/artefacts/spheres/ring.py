@@ -27,7 +27,16 @@ from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening import shape
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.spheres.kind import RingFacts
-from cmm_uq.artefacts.spheres.sphere import ball_with_normals, probing_rows, radial_plot, radius_words, u_of_size
+from cmm_uq.artefacts.spheres.sphere import (
+    ball_with_normals,
+    probed_along,
+    probed_data,
+    probed_table,
+    radial_plot,
+    radius_words,
+    round_shape,
+    u_of_size,
+)
 from cmm_uq.base.messages import Text, number, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
@@ -42,7 +51,6 @@ from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import expansion, refuse
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_states import (
-    NORMAL,
     OUT_OF_ROUND,
     ROUNDNESS,
     about_axis,
@@ -210,16 +218,8 @@ class RingGauge(Radial):
 
 
 def shape_of(facts: RingFacts, points: Points) -> ArtefactShape | None:
-    """Rings, with normals where they are recorded; ``None`` where one has too few points."""
-    rows, radius = shape.rows_by(points.measurement), (facts.length_mm or np.nan) / 2
-    if any(len(r) < LEAST_OF_HEIGHTS for r in rows):
-        return None
-    extent = radius if np.isfinite(radius) else 0.4 * float(np.median([shape.spread(points.xyz[r]) for r in rows]))
-    if not all(name in points.columns for name in NORMAL):
-        return ArtefactShape(rows, _section_misfit, radius, extent, False, (), shape.no_references(points))
-    normals = np.column_stack([points.columns[name] for name in NORMAL])
-    misfit = partial(_ring_with_normals, sense=1.0 if facts.plug else -1.0)
-    return ArtefactShape(rows, misfit, radius, extent, False, NORMAL, normals)
+    with_normals = partial(_ring_with_normals, sense=1.0 if facts.plug else -1.0)
+    return round_shape(facts, points, (LEAST_OF_HEIGHTS, 0.4), _section_misfit, with_normals)
 
 
 def _ring_with_normals(xyz: Floats, normals: Floats, radius: float, sense: float) -> Floats:
@@ -256,15 +256,7 @@ def around() -> Floats:
 def ring(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
     """Points around at one height, each probed along its normal."""
     out = np.column_stack([around(), np.zeros(POINTS)])
-    n = out if cast("RingFacts", facts).plug else -out
-    one = Pattern(
-        0.5 * planned_length(facts, plan) * out,
-        np.arange(1, POINTS + 1),
-        np.ones(POINTS, dtype=np.int64),
-        {},
-        {"normal": n, "approach": -np.where(np.abs(n) > 1e-9, n, 0.0)},
-    )
-    return one.repeated(plan.repeats)
+    return probed_along(0.5 * planned_length(facts, plan) * out, out if cast("RingFacts", facts).plug else -out, plan)
 
 
 def _placed(setting: Setting, ways: tuple[tuple[Text, Floats], ...]) -> tuple[SetUp, ...]:
@@ -286,10 +278,7 @@ PLANNING = Planning(_READY, _PLACES.candidates, _PLACES.elsewhere)
 
 def results(result: Result) -> dict[str, Any]:
     forms, lobes = cast("RingGauge", result.artefact).probed
-    sizes = [None] * len(forms.form) if forms.size is None else (forms.size / MICROMETRE).tolist()
-    each = (forms.measurement.tolist(), forms.repeat.tolist(), forms.count.tolist(), (forms.form / MICROMETRE).tolist())
-    names = ("measurement", "repeat", "points", "roundness_um", "diameter_error_um")
-    rings = [dict(zip(names, one, strict=True)) for one in zip(*each, sizes, strict=True)]
+    rings = probed_data(forms, "roundness_um", "diameter_error_um")
     for one, own in zip(rings, lobes / MICROMETRE, strict=True):
         pairs = zip(ROUNDNESS, own.reshape(-1, 2).tolist(), strict=True)
         one["lobes"] = [
@@ -312,17 +301,13 @@ def sections(result: Result) -> list[Section]:
 
 
 def _table(result: Result, ring: RingGauge) -> Table:
-    size, errors = ring.sizes[0], [say("Roundness")]
-    notes = [say("Roundness: range of the distances from the least-squares axis, of ring, machine and probe together.")]
-    if size.certified:
-        errors.append(say("Error of the diameter"))
-        what = say(
-            "Error of the diameter: of the least-squares ring minus the certified one, whose U is {u} µm (k = 2).",
-            u=u_of_size(size),
-        )
-        notes.append(what)
-    heads = columns([say("Ring"), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm"))])
-    return Table(say("Diameter and roundness"), heads, probing_rows(result, ring.probed[0]), tuple(notes))
+    note = say("Roundness: range of the distances from the least-squares axis, of ring, machine and probe together.")
+    of_size = say(
+        "Error of the diameter: of the least-squares ring minus the certified one, whose U is {u} µm (k = 2).",
+        u=u_of_size(ring.sizes[0]),
+    )
+    heads, notes = (say("Ring"), say("Roundness"), say("Error of the diameter")), (note, of_size)
+    return probed_table(result, ring.probed[0], say("Diameter and roundness"), heads, notes)
 
 
 def _lobes(result: Result, ring: RingGauge) -> Table:

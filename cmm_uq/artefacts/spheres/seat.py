@@ -30,16 +30,42 @@ _STRAY, _LEAST_READINGS = 5.0, 4  # mm by which no arm errs; fewer readings of a
 _AXES = {axis: Verbatim(axis.upper()) for axis in AXES}
 
 
-class Seat(Artefact):
+class Staying(Artefact):
+    """Points that stay where they are, each at a place that is free: 3n observations of n points, along axes of each."""
+
+    def __init__(self, points: Points, placings: Placings) -> None:
+        self.points, self.placings = points, placings
+        self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
+        self.axes = np.tile(
+            np.eye(3), (len(points), 1, 1)
+        )  # (n, 3, 3) in rows: those of the coordinates, unless others
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        return self.placings.means(true_xyz)
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        return np.asarray((self.axes @ displacement).reshape(3 * len(xyz), -1), dtype=np.float64)
+
+    def placing(self, xyz: Floats) -> Freedoms:
+        return self.placings.columns(self.axes)
+
+    def unread(self) -> NDArray[np.bool_]:
+        return self.placings.unread(self.points.xyz, self.axes.transpose(0, 2, 1)).ravel()
+
+    def deviations(self) -> Floats:
+        """(n, 3) mm of each point about the mean of its place, along its axes."""
+        about = self.points.xyz - self.placings.means(self.points.xyz)
+        return np.asarray(np.einsum("nij,nj->ni", self.axes, about))
+
+
+class Seat(Staying):
     """3n observations (x, y, z in turn) of n readings."""
 
     kind = "seat"
     title = say("Seat")
 
     def __init__(self, facts: UncertifiedFacts, points: Points, *, where: str | None = None) -> None:
-        self.points, self.placings = points, Placings.of(points.measurement)
-        self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
-        self._axes = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+        super().__init__(points, Placings.of(points.measurement))
         if (most := max(map(len, self.placings.rows))) < _LEAST_READINGS:
             raise CmmUqError(
                 f"no seat has {_LEAST_READINGS} readings; most have {most}", where=where, fix="Read each ten times"
@@ -53,25 +79,9 @@ class Seat(Artefact):
                 fix="Number each seat by a measurement of its own",
             )
 
-    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        return self.placings.means(true_xyz)
-
-    def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        return np.asarray(displacement.reshape(3 * len(xyz), -1), dtype=np.float64)
-
-    def placing(self, xyz: Floats) -> Freedoms:
-        return self.placings.columns(self._axes)
-
-    def unread(self) -> NDArray[np.bool_]:
-        return self.placings.unread(self.points.xyz, self._axes).ravel()
-
     def words_of(self, observation: int) -> Text:
         axis = _AXES[AXES[observation % 3]]
         return say("the {axis} coordinate of {what}", axis=axis, what=super().words_of(observation))
-
-    def deviations(self) -> Floats:
-        """(n, 3) mm of each reading from the mean of its seat."""
-        return np.asarray(self.points.xyz - self.placings.means(self.points.xyz))
 
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
         """Of each seat twice the standard deviation of its readings, and the largest distance from their mean."""
@@ -89,9 +99,13 @@ class Seat(Artefact):
 
 
 def shape_of(facts: UncertifiedFacts, points: Points) -> ArtefactShape | None:
+    return staying(points, Placings.of(points.measurement))
+
+
+def staying(points: Points, placings: Placings) -> ArtefactShape:
+    """Points of one place in one place."""
     extent = float(np.ptp(points.xyz, axis=0).max(initial=0.0))
-    rows = Placings.of(points.measurement).rows
-    return ArtefactShape(rows, _about_median, np.nan, extent, False, (), np.zeros((len(points), 0)))
+    return ArtefactShape(placings.rows, _about_median, np.nan, extent, False, (), np.zeros((len(points), 0)))
 
 
 def _about_median(xyz: Floats, _: Floats, size: float) -> Floats:

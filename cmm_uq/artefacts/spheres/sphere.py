@@ -15,10 +15,10 @@ from cmm_uq.analysis.planning.candidates import MIDDLE, RelocatedCandidates, Vol
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening import shape
-from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
+from cmm_uq.analysis.screening.shape import ArtefactShape, Misfit, Screening
 from cmm_uq.artefacts.kinds import SphereFacts
 from cmm_uq.base.messages import Number, Text, number, say
-from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Plot, Section, Table, columns, figure_columns
 from cmm_uq.certificate.plots.residuals import deviations_plot, volume_plot
@@ -31,7 +31,7 @@ from cmm_uq.machine.model.artefact_doubt import form_faults
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.effects.own_states import HARMONICS, harmonics, turned_back
+from cmm_uq.machine.physics.effects.own_states import HARMONICS, NORMAL, harmonics, turned_back
 from cmm_uq.maths.geometry import fit_sphere
 from cmm_uq.maths.geometry.fits import enclosing_diameter
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
@@ -95,19 +95,27 @@ class SphereArtefact(Radial):
 
 
 _NORMAL = 0.4  # part of the radius by which a recorded normal may miss the point: normals may be nominal, 20° off
-_NORMALS = tuple(f"n{a}" for a in AXES)
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
-    """Spheres, with normals where they are recorded; ``None`` where one has too few points."""
-    rows, radius = shape.rows_by(points.measurement), (facts.length_mm or np.nan) / 2
-    if any(len(r) < 5 for r in rows):
+    return round_shape(facts, points, (5, 0.5), shape.ball_misfit, ball_with_normals)
+
+
+def round_shape(
+    facts: ArtefactFacts, points: Points, least: tuple[int, float], misfit: Misfit, with_normals: Misfit
+) -> ArtefactShape | None:
+    """What has a diameter, with normals where they are recorded; ``None`` where one has too few points.
+
+    ``least``: points of one, and its radius over the spread of its points.
+    """
+    rows, radius, (fewest, part) = shape.rows_by(points.measurement), (facts.length_mm or np.nan) / 2, least
+    if any(len(r) < fewest for r in rows):
         return None
-    extent = radius if np.isfinite(radius) else 0.5 * float(np.median([shape.spread(points.xyz[r]) for r in rows]))
-    if not all(name in points.columns for name in _NORMALS):
-        return ArtefactShape(rows, shape.ball_misfit, radius, extent, False, (), shape.no_references(points))
-    normals = np.column_stack([points.columns[name] for name in _NORMALS])
-    return ArtefactShape(rows, ball_with_normals, radius, extent, False, _NORMALS, normals)
+    extent = radius if np.isfinite(radius) else part * float(np.median([shape.spread(points.xyz[r]) for r in rows]))
+    if not all(name in points.columns for name in NORMAL):
+        return ArtefactShape(rows, misfit, radius, extent, False, (), shape.no_references(points))
+    normals = np.column_stack([points.columns[name] for name in NORMAL])
+    return ArtefactShape(rows, with_normals, radius, extent, False, NORMAL, normals)
 
 
 def ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
@@ -141,10 +149,13 @@ def sphere(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
         ring = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.full(count, np.cos(polar))]
         normals.append(np.column_stack(ring))
     n = np.vstack(normals)
-    one = Pattern(
-        0.5 * planned_length(facts, plan) * n, np.arange(1, len(n) + 1), np.ones(len(n), dtype=np.int64), {},
-        {"normal": n, "approach": -np.where(np.abs(n) > 1e-9, n, 0.0)},
-    )  # fmt: skip
+    return probed_along(0.5 * planned_length(facts, plan) * n, n, plan)
+
+
+def probed_along(places: Floats, normals: Floats, plan: PlanFacts) -> Pattern:
+    """Points (n, 3), each probed against its normal."""
+    numbers, along = np.arange(1, len(places) + 1), -np.where(np.abs(normals) > 1e-9, normals, 0.0)
+    one = Pattern(places, numbers, np.ones(len(places), dtype=np.int64), {}, {"normal": normals, "approach": along})
     return one.repeated(plan.repeats)
 
 
@@ -159,11 +170,15 @@ PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.
 
 
 def results(result: Result) -> dict[str, Any]:
-    forms = cast("SphereArtefact", result.artefact).forms()
+    return {"spheres": probed_data(cast("SphereArtefact", result.artefact).forms(), "form_error_um", "size_error_um")}
+
+
+def probed_data(forms: Forms, *errors: str) -> list[dict[str, Any]]:
+    """Of everything probed its numbers, how many points, its form and the error of its size, µm, by their names."""
     sizes = [None] * len(forms.form) if forms.size is None else (forms.size / MICROMETRE).tolist()
     each = (forms.measurement.tolist(), forms.repeat.tolist(), forms.count.tolist(), (forms.form / MICROMETRE).tolist())
-    names = ("measurement", "repeat", "points", "form_error_um", "size_error_um")
-    return {"spheres": [dict(zip(names, one, strict=True)) for one in zip(*each, sizes, strict=True)]}
+    names = ("measurement", "repeat", "points", *errors)
+    return [dict(zip(names, one, strict=True)) for one in zip(*each, sizes, strict=True)]
 
 
 def sections(result: Result) -> list[Section]:
@@ -173,34 +188,37 @@ def sections(result: Result) -> list[Section]:
 
 
 def _table(result: Result, sphere: SphereArtefact) -> Table:
-    forms, size = sphere.forms(), sphere.sizes[0]
-    errors = [say("Form error")]
-    notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
-    if size.certified:
-        errors.append(say("Size error"))
-        what = say(
-            "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
-            u=u_of_size(size),
-        )
-        notes.append(what)
-    heads = columns([say("Sphere"), *figure_columns(say("Points")), *figure_columns(*errors, unit=unit("µm"))])
-    return Table(say("Probing errors"), heads, probing_rows(result, forms), tuple(notes))
+    note = say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")
+    of_size = say(
+        "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
+        u=u_of_size(sphere.sizes[0]),
+    )
+    heads, notes = (say("Sphere"), say("Form error"), say("Size error")), (note, of_size)
+    return probed_table(result, sphere.forms(), say("Probing errors"), heads, notes)
 
 
 def u_of_size(size: Size) -> Number:
-    return rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
+    return rounded(0.0, 2 * size.sd / MICROMETRE)[1] if 0 < size.sd < np.inf else Number("0")
 
 
-def probing_rows(result: Result, forms: Forms) -> tuple[tuple[Text, ...], ...]:
-    """Of everything probed its number, how many points, its form and, where it is certified, the error of its size, µm."""
-    noise = result.noise.expanded
+def probed_table(
+    result: Result, forms: Forms, caption: Text, headings: tuple[Text, Text, Text], notes: tuple[Text, Text]
+) -> Table:
+    """Of everything probed its number, how many points, its form and, where it is certified, the error of its size, µm.
+
+    ``headings``: of what is probed, of form and of size; ``notes``: on these two.
+    """
+    noise, (what, *errors) = result.noise.expanded, headings
+    shown = 1 if forms.size is None else 2
     repeated, least = forms.repeat.max() > 1, max(forms.certified / MICROMETRE, noise / 10)
     rows: list[tuple[Text, ...]] = []
     for i, measurement in enumerate(forms.measurement):
         place = numbered(measurement, forms.repeat[i] if repeated else None)
         error = () if forms.size is None else (rounded(float(forms.size[i]) / MICROMETRE, noise)[0],)
         rows.append((place, number(forms.count[i]), rounded(float(forms.form[i]) / MICROMETRE, least)[0], *error))
-    return tuple(rows)
+    figures = figure_columns(*errors[:shown], unit=unit("µm"))
+    heads = columns([what, *figure_columns(say("Points")), *figures])
+    return Table(caption, heads, tuple(rows), notes[:shown])
 
 
 def _by_point(result: Result, sphere: SphereArtefact) -> Plot:

@@ -17,15 +17,15 @@ from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import TableSpheresFacts
+from cmm_uq.artefacts.spheres.seat import Staying, staying
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.rotary import RotaryAxis, RotaryMachine
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.artefact import Artefact, ArtefactFigure, Placings
+from cmm_uq.machine.model.artefact import ArtefactFigure, Placings
 from cmm_uq.machine.model.kind import AT_20_C, Beginning
 from cmm_uq.machine.model.recorded import place
-from cmm_uq.maths.inference.linear_model import Freedoms
 
 FIGURES = ("FR", "FT", "FA")  # ranges along the radius, the tangent and the axis
 RANGES = ("FX", "FY", "FZ")  # where several axes turned, or a sphere lies on the axis: along those of the coordinates
@@ -35,14 +35,13 @@ _STRAY, _ON_AXIS = 5.0, 1.0  # mm by which no table errs; from the axis within w
 _TURN, POSITIONS = 720.0, 7  # degrees out and back, and positions of the table in each sense
 
 
-class TableSpheres(Artefact):
+class TableSpheres(Staying):
     """Spheres as recorded: three observations (radial, tangential, axial) of each of n centres."""
 
     kind = "table_spheres"
     title = say("Spheres on a rotary table")
 
     def __init__(self, facts: TableSpheresFacts, points: Points, *, where: str | None = None) -> None:
-        self.points = points
         self.machine = _turning(points.machine)
         self.read = {
             axis.letter: points.columns[axis.column] for axis in self.machine.rotary if axis.column in points.columns
@@ -53,13 +52,11 @@ class TableSpheres(Artefact):
             raise CmmUqError(problem, where=where or "recording", fix=fix)
         load = np.ones_like(points.measurement) if facts.stay else points.measurement
         each, index = np.unique(np.column_stack([load, points.point]), axis=0, return_inverse=True)
-        self.placings = Placings(index.ravel().astype(np.int64), each[:, 0].astype(np.int64))
-        self.rows = np.repeat(np.arange(len(points)), 3)[:, None]
+        super().__init__(points, Placings(index.ravel().astype(np.int64), each[:, 0].astype(np.int64)))
         whole = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)[1]
         self.runs = [np.flatnonzero(whole.ravel() == i) for i in range(int(whole.max()) + 1)]  # of one sphere each
         middle, n = self.placings.means(points.xyz), len(points)
         self.radius, self.axial, self.by_axis = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool)
-        self.axes = np.tile(np.eye(3), (n, 1, 1))
         self.turns: dict[int, str] = {}
         for run in np.unique(points.measurement).tolist():
             own = np.flatnonzero(points.measurement == run)
@@ -88,27 +85,10 @@ class TableSpheres(Artefact):
             radial = across / radius[:, None]
             self.axes[rows], self.by_axis[rows] = np.stack([radial, np.cross(axis, radial), axis], axis=1), True
 
-    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        return self.placings.means(true_xyz)
-
-    def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        return np.asarray((self.axes @ displacement).reshape(3 * len(xyz), -1), dtype=np.float64)
-
-    def placing(self, xyz: Floats) -> Freedoms:
-        return self.placings.columns(self.axes)
-
-    def unread(self) -> NDArray[np.bool_]:
-        return self.placings.unread(self.points.xyz, self.axes.transpose(0, 2, 1)).ravel()
-
     def words_of(self, observation: int) -> Text:
         i, k = divmod(observation, 3)
         what = DIRECTIONS[k] if self.by_axis[i] else Verbatim(AXES[k].upper())
         return say("the {direction} coordinate of {what}", direction=what, what=super().words_of(observation))
-
-    def deviations(self) -> Floats:
-        """(n, 3) mm of each centre about the mean of its sphere: radial, tangential, axial."""
-        about = self.points.xyz - self.placings.means(self.points.xyz)
-        return np.asarray(np.einsum("nij,nj->ni", self.axes, about))
 
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
         """Range of each sphere's coordinates over all positions, by direction: of those that one axis turned, or of others."""
@@ -172,15 +152,8 @@ def sphere_name(point: int) -> Text:
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
-    of = Placings.of(
-        np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)[1].ravel()
-    )
-    extent = float(np.ptp(points.xyz, axis=0).max(initial=0.0))
-    return ArtefactShape(of.rows, _about_median, np.nan, extent, False, (), np.zeros((len(points), 0)))
-
-
-def _about_median(xyz: Floats, _: Floats, size: float) -> Floats:
-    return np.asarray(np.linalg.norm(xyz - np.median(xyz, axis=0), axis=1))
+    whole = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)[1]
+    return staying(points, Placings.of(whole.ravel()))
 
 
 SCREENING = Screening(shape_of, balls=True)
