@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cmm_uq.app.commands.laboratory.due import WhatIsDue, history_of, what_is_due, write_due, write_history
 from cmm_uq.base.messages import html_table
@@ -76,16 +76,10 @@ class History:
         """A row for each value of each certificate and interim check: date, value, u, its artefact."""
         import pandas as pd
 
-        found: list[dict[str, Any]] = []
-        for one in self.found.values:
-            s = series = one.series
-            columns = (s.day, s.value, s.u, s.u_artefact, s.artefact, s.entry, s.interim)
-            found += [
-                {"name": series.name, "date": dt.date.fromordinal(int(day)), "value": float(value), "u": float(u),
-                 "u_artefact": float(common), "artefact": str(artefact), "entry": int(entry), "interim": bool(interim)}
-                for day, value, u, common, artefact, entry, interim in zip(*columns, strict=True)
-            ]  # fmt: skip
-        return pd.DataFrame(found)
+        from cmm_uq.certificate.pages.history import recorded_rows
+
+        every = [one.series for one in self.found.values]
+        return pd.DataFrame([{"name": series.name, **row} for series in every for row in recorded_rows(series)])
 
     def write(self, folder: str | Path, *, force: bool = False) -> dict[str, Path]:
         """Write ``history.html`` and ``history.json`` to a folder, as ``cmm-uq history --out`` does; ``force`` likewise."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -37,12 +36,9 @@ def diagnosed_outcome(result: JobDiagnosis) -> Outcome:
     short = words.summary_of(result.job.facts, d.verdict, words.summary_lines(result), result.findings)
     with lettered_in(result.job.facts.job.language):
         document = diagnosis_document(result)
-    return Outcome(result, lambda: document, diagnosis_results(result), short, document.warnings, in_order=d.agrees)
-
-
-def diagnosis_results(result: JobDiagnosis) -> dict[str, Any]:
-    sampling = attributes(result.diagnosis.posterior, "sampler", "seed", "ess_min", "rhat_max", "converged")
-    return {**head(result.job), "sampling": sampling, "diagnosis": diagnosis_data(result)}
+    sampling = attributes(d.posterior, "sampler", "seed", "ess_min", "rhat_max", "converged")
+    data = {**head(result.job), "sampling": sampling, "diagnosis": diagnosis_data(result)}
+    return Outcome(result, lambda: document, data, short, document.warnings, in_order=d.agrees)
 
 
 def diagnosis_document(result: JobDiagnosis) -> doc.Document:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from calendar import isleap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from cmm_uq.laboratory.due.steps import DatedStep
+    from cmm_uq.laboratory.records.facts import Series
 
 SCHEMA = "cmm-uq/history/1"
 COVERAGE = 2.0  # factor of every expanded uncertainty here: 95 %, as of a normal distribution
@@ -177,19 +178,21 @@ def history_data(history: MachineHistory) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def recorded_rows(series: Series) -> Iterator[dict[str, Any]]:
+    """What each certificate and interim check states of one value, by day."""
+    columns = (series.day, series.value, series.u, series.u_artefact, series.artefact, series.entry, series.interim)
+    for ordinal, value, u, common, artefact, entry, interim in zip(*columns, strict=True):
+        yield {
+            "date": dt.date.fromordinal(int(ordinal)), "value": float(value), "u": float(u), "u_artefact": float(common),
+            "artefact": str(artefact), "entry": int(entry), "interim": bool(interim),
+        }  # fmt: skip
+
+
 def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
-    series = one.series
-    dates = [dt.date.fromordinal(int(ordinal)).isoformat() for ordinal in series.day]
-    columns = (series.value, series.u, series.u_artefact, series.artefact, series.entry, series.interim)
-    rows = zip(dates, *columns, strict=True)
-    change, line, crossing = one.change, one.line, one.crossing
+    series, change, line, crossing = one.series, one.change, one.line, one.crossing
     return {
         **attributes(series, "quantity", "unit", "limit"), "beyond_limit": one.beyond, "outcome": one.outcome or None,
-        "recorded": [
-            {"date": date, "value": float(value), "u": float(u), "u_artefact": float(common), "artefact": str(artefact),
-             "entry": int(entry), "interim": bool(interim)}
-            for date, value, u, common, artefact, entry, interim in rows
-        ],
+        "recorded": [{**row, "date": row["date"].isoformat()} for row in recorded_rows(series)],
         "change": None if change is None else {
             "value": change.value, "u": change.u, "p": change.chance, "adjusted_between": one.adjusted,
             "significant": history.significant(one),
