@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.messages import NOTHING, Argument, Message, Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.values import dataclass
 
@@ -31,11 +31,10 @@ def position_of(direction: Floats) -> Text:
     """Position of a line in words, from its direction (3,), either way along it."""
     u = direction / np.linalg.norm(direction)
     counts = np.abs(u) > ALIGNED
-    taken = [a.upper() for a, counted in zip(AXES, counts, strict=True) if counted]
-    if len(taken) == 1:
-        return say("parallel to {axis}", axis=Verbatim(taken[0]))
+    if np.sum(counts) == 1:
+        return PARALLELS[int(np.argmax(counts))]
     axes = _signed(u, counts)
-    return say("space diagonal {axes}", axes=axes) if len(taken) == 3 else say("face diagonal {axes}", axes=axes)
+    return say("space diagonal {axes}", axes=axes) if np.all(counts) else say("face diagonal {axes}", axes=axes)
 
 
 def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
@@ -48,22 +47,18 @@ def crossed_travel(machine: Machine, middle: Floats, direction: Floats) -> float
     return _crossed(*_line(machine, middle, direction))
 
 
-def too_short(position: Text, machine: Machine, lines: Sequence[tuple[int, Floats, Floats]]) -> Text:
+def too_short(position: Message, machine: Machine, lines: Sequence[tuple[int, Floats, Floats]]) -> Text:
     """A diagonal that is missing, with the line of its direction that crosses most of the travel and is none.
 
     lines : number of the measurement, middle (3,) and direction (3,) of each.
     """
-    axes = str.__str__(position).rpartition("diagonal ")[2]
-    nearest = (0.0, "", -1)
+    share, axis, measurement = 0.0, "", -1
     for number, middle, direction in lines:
-        if str.__str__(position_on(machine, middle, direction)) == f"oblique {axes}":
+        if position_on(machine, middle, direction) == _oblique(position.arguments.get("axes", NOTHING)):
             u = np.abs(direction / np.linalg.norm(direction))
             shares = (crossed_travel(machine, middle, direction) or 0.0) * u / np.ptp(machine.travel_mm, axis=1)
-            own = min(
-                (float(share), axis.upper()) for share, axis in zip(shares, AXES, strict=True) if axis.upper() in axes
-            )
-            nearest = max(nearest, (*own, number))
-    share, axis, measurement = nearest
+            own = min((float(shares[k]), AXES[k].upper()) for k in np.flatnonzero(u > ALIGNED))
+            share, axis, measurement = max((share, axis, measurement), (*own, number))
     if not axis:
         return position
     return say(
@@ -96,7 +91,7 @@ def _position_on(ends: Numbers, place: Numbers, direction: Numbers) -> Text:
     if np.all(reached):
         return say("space diagonal {axes}", axes=_signed(u, np.ones(3, dtype=bool)))
     if np.all(counts) or (crossed and not np.all(reached[counts])):
-        return say("oblique {axes}", axes=_signed(u, counts))
+        return _oblique(_signed(u, counts))
     return position_of(u)
 
 
@@ -113,6 +108,10 @@ def _crossed(ends: Numbers, place_mm: Numbers, direction: Numbers) -> float | No
     return max(0.0, float(crossed.max(axis=1).min() - crossed.min(axis=1).max()))
 
 
+def _oblique(axes: Argument) -> Message:
+    return say("oblique {axes}", axes=axes)
+
+
 def share_of_travel(machine: Machine, middle: Floats, direction: Floats, length: float) -> float | None:
     """Length, mm, over the travel along its line; ``None`` where no travel is stated or the line lies outside it."""
     available = crossed_travel(machine, middle, direction)
@@ -127,7 +126,7 @@ def _signed(u: Floats, counts: NDArray[np.bool_]) -> Text:
 
 @dataclass(frozen=True)
 class LengthPlan:
-    positions: tuple[Text, ...]
+    positions: tuple[Message, ...]
     lengths: int  # different ones in each position
     repeats: int  # of each length in each position
     least_share: float  # the longest length in a position over the travel along it
@@ -187,6 +186,8 @@ class Condition:
     what: Text  # it asks, and how much of it there is
     missing: tuple[Text, ...] = ()  # what is not there, each in words; nothing when the condition is met
     remedy: Text = NOTHING  # which key of the job states what is missing, for who writes it
+    line: Text = NOTHING  # of the test uncertainty, which is neither stated nor declared; key: in [test_uncertainty]
+    key: str = ""
 
     @property
     def met(self) -> bool:

@@ -266,7 +266,7 @@ class Test:
             *self._gaps_of_short_gauge(),
             *(Condition(what, (what,), Verbatim(at)) for what, at in under.lapsed),
         )
-        missing = {text: condition.remedy for condition in asked for text in condition.missing}
+        missing = {text: condition for condition in asked for text in condition.missing}
         aside = [item for item in items if item.set_aside]
         outside = () if left_out is None else left_out.without_value
         more = [*remarks, *_set_aside(under.set_aside)]

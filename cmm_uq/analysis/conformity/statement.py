@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Collection, Sequence
-from itertools import zip_longest
 from typing import Literal
 
 import numpy as np
 
 from cmm_uq.analysis.conformity.decision import Decision, Risks
+from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, say
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import UNITS
@@ -74,15 +74,15 @@ class Statement:
     risks: Risks | None = None  # of all machines alike, for the named quantity; None without a prior
     # readings that the screening left out of the estimates and that have no value, in words: each fails
     outside: tuple[Text, ...] = ()
-    # of each that is missing, which key would state it; nothing where its words say that
-    remedies: tuple[Text, ...] = ()
+    conditions: tuple[Condition, ...] = ()  # that each which is missing is of, with the key that would state it
 
     @property
     def missing_with_remedies(self) -> tuple[Text, ...]:
         """What is missing with the keys that would state it, for who wrote the job."""
+        of = self.conditions or (Condition(NOTHING),) * len(self.missing)
         return tuple(
-            say("{what} ({remedy})", what=what, remedy=remedy) if remedy else what
-            for what, remedy in zip_longest(self.missing, self.remedies, fillvalue=NOTHING)
+            say("{what} ({remedy})", what=what, remedy=one.remedy) if one.remedy else what
+            for what, one in zip(self.missing, of, strict=True)
         )
 
     @property

@@ -43,12 +43,11 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
     found = []
     for line in _acting(lines, artefact):
         if not _met(line, artefact, under):
-            beside = f"{key_of_line(line, angular=artefact.angular)} in [test_uncertainty]"
-            key = f"{artefact.key_of_u} in [artefact]" if line == "calibration" else beside
+            key = "" if line == "calibration" else key_of_line(line, angular=artefact.angular)
+            place = f"{key} in [test_uncertainty]" if key else f"{artefact.key_of_u} in [artefact]"
             what = say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line])
-            found.append(
-                _lacks(what, f'{key}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]')
-            )
+            remedy = f'{place}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]'
+            found.append(replace(_lacks(what, remedy), line=_NAMES[line] if key else NOTHING, key=key))
     acts = under.uncertainty.u_temperature_k and not under.uncertainty.declared("temperature")
     if "temperature" in _acting(lines, artefact) and "expansion" not in lines and acts and not under.cte_per_k:
         what = say("uncertainty: that of the temperature is stated, and no expansion coefficient by which it acts")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.plan_conditions import lengths_measured, nominals, with_offset
-from cmm_uq.analysis.conformity.plans import LengthPlan
+from cmm_uq.analysis.conformity.plans import FACE_DIAGONALS, PARALLELS, LengthPlan
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.artefacts.gauge_lines import StepGauge
@@ -18,7 +18,7 @@ from tests.analysis.conformity.recorded import MACHINE, bars, gauge
 from tests.recordings import TRAVEL, bar_facts
 
 X, Y, _ = np.eye(3)
-PLAN = LengthPlan(("parallel to X", "parallel to Y"), 2, 2, 0.664, 30.0)
+PLAN = LengthPlan(PARALLELS[:2], 2, 2, 0.664, 30.0)
 
 
 def said(artefact: StepGauge | Ballbar, plan: LengthPlan = PLAN) -> tuple[list[str], list[str]]:
@@ -159,7 +159,7 @@ def test_lengths_up_to_a_millimetre_apart_are_one_nominal_length() -> None:
 
 def test_a_line_that_crosses_too_little_for_a_diagonal_is_named_with_what_it_crosses() -> None:
     """Travel 900 × 550 mm in X and Y: 45° in XY crosses all 550 mm of Y and as much of X, 61 % of it."""
-    plan = replace(PLAN, positions=("face diagonal +X +Y",))
+    plan = replace(PLAN, positions=FACE_DIAGONALS[:1])
     oblique = (X + Y) / np.sqrt(2.0)
     _, missing = said(along((oblique, [25.0, 400.0])), plan)
     assert missing[0].startswith("face diagonal +X +Y (measurement 1 lies along it, but its line crosses ")

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.plans import FACE_DIAGONALS, crossed_travel, position_of, position_on, share_of_travel
+from cmm_uq.analysis.conformity.plans import (
+    FACE_DIAGONALS,
+    PARALLELS,
+    SPACE_DIAGONALS,
+    crossed_travel,
+    position_of,
+    position_on,
+    share_of_travel,
+    too_short,
+)
+from cmm_uq.base.languages.translation import Code, translated
 from cmm_uq.base.points import Machine
 from tests.recordings import TRAVEL
 
@@ -125,3 +135,19 @@ def test_the_travel_is_that_of_the_scales() -> None:
     """Recorded 1000 mm off the scales: the origin brings the line back."""
     moved = Machine("m", "XYZ", TRAVEL, np.array([1000.0, 0, 0]))
     assert crossed_travel(moved, TRAVEL.mean(axis=1) - [1000, 0, 0], np.array([1.0, 0, 0])) == pytest.approx(900.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [("en", "its line crosses 70 % of the travel of X"), ("de", "ihre Linie durchquert 70 % des Verfahrwegs von X"),
+     ("fr", "70 %"), ("ja", "70 %")],
+)  # fmt: skip
+def test_a_diagonal_that_is_missing_names_the_nearest_line_in_any_language(code: Code, said: str) -> None:
+    """Moved along X by 30 % of its travel, of which it then crosses 70 %, and by 40 %."""
+    middle, diagonal = TRAVEL.mean(axis=1), np.array([900.0, 550, 500])
+    lines = [(7, middle + np.array([360.0, 0, 0]), diagonal), (8, middle + np.array([270.0, 0, 0]), -diagonal)]
+    told = [str.__str__(translated(too_short(one, MACHINE, lines), code)) for one in (*SPACE_DIAGONALS, *PARALLELS)]
+    (named,) = [text for text in told if "8" in text]
+    assert said in named.replace("\xa0", " ")
+    assert "+X +Y +Z" in named
+    assert not [text for text in told if "7" in text.replace("70", "").replace("75", "")]

@@ -16,14 +16,16 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.estimation import decision
-from cmm_uq.app.commands.jobs.check import Problem, check_job, in_lines
+from cmm_uq.app.commands.jobs.check import Lack, Problem, check_job, in_lines
 from cmm_uq.app.commands.jobs.exchange import own_format, read_export, write_job_of_export, write_recording
 from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.languages.translation import Code, translated
 from cmm_uq.base.points import Machine
+from cmm_uq.base.values import replace
 from cmm_uq.certificate.clauses import formal_warnings, traceability_section
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.jobs.importing.format import ImportKeys
@@ -373,3 +375,30 @@ def test_what_a_certificate_lacks_is_told_in_one_line_with_every_key() -> None:
     for one in lacking:
         table, _, key = one.key.partition(" ")
         assert re.search(rf"{re.escape(table)} [^;]*\b{key}\b", told)
+
+
+@pytest.mark.parametrize("code", ["en", "de", "fr", "ja"])
+def test_what_a_statement_lacks_is_one_line_in_any_language(gauge: Path, code: Code) -> None:
+    """Lines of the uncertainty with their keys together, all else, the calibration's key in [artefact] too, in its words."""
+    change(gauge / "job.toml", r"^\[test_uncertainty.negligible\]\n(\w+ = .*\n)+", "")
+    change(gauge / "job.toml", r"^u_um = .*$", "u_um = 0.0")
+    change(gauge / "job.toml", r"^mpe = .*$", 'mpe = { a_um = 4.0, k = 100.0 }\nrule = "simple"')
+    lacks = [one.lack for one in check_job(gauge).warnings if one.lack]
+    keys = [one.condition.key for one in lacks if one.condition.key]
+    assert keys == ["u_cte_per_k", "u_temperature_k", "u_alignment_um", "u_fixturing_um"]
+    assert [
+        one
+        for one in lacks
+        if "calibration of the artefact is neither" in one.what and "(u_um in [artefact]" in one.what
+    ]
+    said = [
+        Lack(
+            one.statement, translated(one.what, code), replace(one.condition, line=translated(one.condition.line, code))
+        )
+        for one in lacks
+    ]
+    (told,) = in_lines([Problem(str.__str__(one.what), "job.toml", key="[[conformity]] 1", lack=one) for one in said])
+    named = ", ".join(str.__str__(one.condition.line) for one in said if one.condition.key)
+    assert f"uncertainty of {named} ({', '.join(keys)} in [test_uncertainty], or declared" in told
+    for one in said:
+        assert bool(one.condition.key) != (str.__str__(one.what) in told)

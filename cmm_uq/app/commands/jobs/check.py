@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.conformity.standards import decidable
 from cmm_uq.app.commands.estimation import decision
 from cmm_uq.app.commands.model import recorded_model, refuse_unmeasured
@@ -41,17 +42,26 @@ _PLACE = re.compile(
 _KEY_BEHIND = re.compile(r"(?P<file>\S.*?\.toml) (?P<key>\[.*)", re.DOTALL)
 """Where a message names the key behind the file without a colon."""
 
-_NOT_STATED = "not stated: "
-_LACKING = "will be no complete test, for it lacks "
+_NOT_STATED, _LACKS = "not stated: ", " will be no complete test, for it lacks "
 _ROWS = (".csv", ".txt", ".tsv")  # of a file whose lines are rows
 _TABLE_KEY = re.compile(r"\[+([^\]]+)\]+ ?([\w.]*)")
+
+
+@dataclass(frozen=True)
+class Lack:
+    """What a statement of conformity lacks of its standard's test, by which it cannot be a pass."""
+
+    statement: str
+    what: Text
+    condition: Condition
 
 
 @dataclass(frozen=True)
 class Problem:
     """What is wrong with a job or should be known, where it stands, and how to mend it.
 
-    ``line``: of the file, from 1; ``key``: of job.toml, as ``[artefact] u_um``, or column of a recording.
+    ``line``: of the file, from 1; ``key``: of job.toml, as ``[artefact] u_um``, or column of a recording; ``unstated``:
+    whether it is what a certificate asks for; ``lack``: what a statement of conformity lacks.
     """
 
     problem: str
@@ -59,6 +69,8 @@ class Problem:
     line: int | None = None
     key: str = ""
     fix: str = ""
+    unstated: bool = False
+    lack: Lack | None = None
 
     @classmethod
     def of(cls, error: CmmUqError) -> Problem:
@@ -82,16 +94,16 @@ def in_lines(problems: Sequence[Problem]) -> tuple[str, ...]:
     together: dict[object, list[Problem]] = {}
     for one in problems:
         alike: object = one
-        if one.problem.startswith(_NOT_STATED):
+        if one.unstated:
             alike = one.file
-        elif _LACKING in one.problem:
-            alike = (one.key, _LACKING)
+        elif one.lack:
+            alike = (one.key, one.lack.statement)
         elif one.line and one.file.endswith(_ROWS):
             alike = (one.file, one.key, re.sub(r"'[^']*'|[\d.]+", "…", one.problem), one.fix)
         together.setdefault(alike, []).append(one)
     return tuple(
-        _lacking_together(each)
-        if _LACKING in each[0].problem
+        str(replace(each[0], problem=_lacking_together(lacks)))
+        if (lacks := [one.lack for one in each if one.lack])
         else str(each[0])
         if len(each) == 1
         else _not_stated(alike, each)
@@ -111,20 +123,14 @@ def _not_stated(file: str, every: Sequence[Problem]) -> str:
     return str(Problem(f"{_NOT_STATED}what ISO/IEC 17025:2017, 7.8 asks for: {keys}", file, fix=fix))
 
 
-_UNSTATED = re.compile(r"uncertainty: (?P<line>.*) is neither stated nor declared negligible \((?P<key>\w+) in .*\)")
-
-
-def _lacking_together(every: Sequence[Problem]) -> str:
+def _lacking_together(every: Sequence[Lack]) -> str:
     """What one statement lacks, the lines of its uncertainty with their keys as one."""
-    by, each = every[0].problem.partition(_LACKING)[0], [one.problem.partition(_LACKING)[2] for one in every]
-    lines = [match for one in each if (match := _UNSTATED.fullmatch(one))]
-    whole = [one for one in each if not _UNSTATED.fullmatch(one)]
-    if lines:
-        named, keys = (", ".join(match[group] for match in lines) for group in ("line", "key"))
-        whole.append(
-            f"uncertainty of {named} ({keys} in [test_uncertainty], or declared in [test_uncertainty.negligible])"
-        )
-    return str(replace(every[0], problem=f"{by}{_LACKING}{'; '.join(whole)}"))
+    whole = [str.__str__(one.what) for one in every if not one.condition.key]
+    if unstated := [one.condition for one in every if one.condition.key]:
+        named, keys = ", ".join(str.__str__(one.line) for one in unstated), ", ".join(one.key for one in unstated)
+        place = "in [test_uncertainty], or declared in [test_uncertainty.negligible]"
+        whole.append(f"uncertainty of {named} ({keys} {place})")
+    return f"{every[0].statement}{_LACKS}{'; '.join(whole)}"
 
 
 def _of_rows(every: Sequence[Problem]) -> str:
@@ -263,10 +269,10 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
     for i, wish in enumerate(facts.conformity, 1):
         with wrong.going_on():
             found = decision(job, model, findings, i)
-            by = f"{wish.standard} {found.characteristic}"
-            undecided += [
-                _lacking(job.folder / "job.toml", f"[[conformity]] {i}", by, one) for one in found.missing_with_remedies
-            ]
+            by, file = f"{wish.standard} {found.characteristic}", str(job.folder / "job.toml")
+            for what, condition in zip(found.missing_with_remedies, found.conditions, strict=True):
+                text = f"{by}{_LACKS}{str.__str__(what)}"
+                undecided.append(Problem(text, file, key=f"[[conformity]] {i}", lack=Lack(by, what, condition)))
     if job.further:
         from cmm_uq.app.commands.certificates.further import further_certificates, verify_further
 
@@ -274,11 +280,6 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
             further_certificates(job, job, verify_further(job))
     lines = ((one, one.lines[0] if one.lines else None) for one in findings)
     return undecided + [Problem(str(one.why), job.recording_path, line, one.column or "") for one, line in lines]
-
-
-def _lacking(path: Path, key: str, by: str, what: Text) -> Problem:
-    """What a statement of conformity lacks of its standard's test, by which it cannot be a pass."""
-    return Problem(f"{by} {_LACKING}{str.__str__(what)}", str(path), key=key)
 
 
 def _to_be_known(job: Job, path: Path) -> list[Problem]:
@@ -291,14 +292,12 @@ def _to_be_known(job: Job, path: Path) -> list[Problem]:
         said = f"{str.__str__(fact.label)[0].lower()}{str.__str__(fact.label)[1:]}: {str.__str__(fact.value)}"
         problems.append(Problem(said, str(path), key="[recording] lines", fix="Say where each lies, if they differ"))
     if kind_of(job).tested and not job.facts.conformity:
-        said, fix = (
-            "nothing will be decided: no standard and no limit is stated",
-            "Give both, where more is wanted than a calibration",
-        )
+        said = "nothing will be decided: no standard and no limit is stated"
+        fix = "Give both, where more is wanted than a calibration"
         problems.append(Problem(said, str(path), key="[[conformity]] standard", fix=fix))
     for one in missing(job) if certifies(job) else ():
         text = f"{_NOT_STATED}{one.asks} ({one.clause}), which ISO/IEC 17025:2017 asks for"
-        problems.append(Problem(text, str(path), _line_of(one.key, content), one.key, f"Give {one.key}"))
+        problems.append(Problem(text, str(path), _line_of(one.key, content), one.key, f"Give {one.key}", unstated=True))
     return problems
 
 
