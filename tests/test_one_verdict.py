@@ -298,13 +298,13 @@ def test_the_records_what_is_due_and_the_history(seed: int, recorded: Callable[[
 @each
 def test_the_fleet(seed: int, recorded: Callable[[int], Records]) -> None:
     of, records = drawn(seed), recorded(seed)
-    frame = records.all_series()
-    stated = outcomes_of(records, {int(entry) for entry in frame["entry"]})
+    ((serial, every),) = records.all_series().items()
+    stated = outcomes_of(records, {int(entry) for one in every.values() for entry in one.entry})
     nothing = SimpleNamespace(estimates=SimpleNamespace(crossing=None))
-    for name, rows_ in frame.groupby("name"):
-        members = tuple(_members(rows_, {}, stated))
+    for name, series in every.items():
+        members = tuple(_members({serial: series}, {serial: records.machine(serial)}, stated))
         found = FleetValue(name, name, "", members, nothing, np.ones(1, bool), 0)
-        if said := of.stated.get(str(name)):
+        if said := of.stated.get(name):
             assert found.beyond.tolist() == [said in ("fail", "conditional fail")]
 
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -24,9 +23,6 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.laboratory.records.facts import Series
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 YEAR = 365.25  # days: rates and spreads are stated per year
 HORIZON = 40.0  # years that are looked ahead; what is later is never
@@ -79,12 +75,12 @@ class DriftHistory:
         return replace(self, value=self.value / unit, u=self.u / unit, u_artefact=self.u_artefact / unit)
 
 
-def history(series: Series | pd.DataFrame, adjusted_after: float | None = None) -> DriftHistory:
+def history(series: Series, adjusted_after: float | None = None) -> DriftHistory:
     """A series of the records as the model takes it.
 
     Parameters
     ----------
-    series : of the records, or its rows with columns of the same names, by day and entry.
+    series : of the records.
     adjusted_after : ordinal of the machine's newest adjustment; it counts where it is after the last certificate.
 
     Raises

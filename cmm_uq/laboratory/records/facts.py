@@ -16,7 +16,7 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.values import dataclass, field
+from cmm_uq.base.values import dataclass, field, replace
 
 if TYPE_CHECKING:
     import numpy as np
@@ -330,6 +330,11 @@ class Series:
             np.array([one.toordinal() for one in day]), np.array(value, dtype=float), np.array(u, dtype=float),
             np.array(u_artefact, dtype=float), np.array(artefact), np.array(entry), since, np.array(interim, dtype=bool),
         )  # fmt: skip
+
+    def where(self, chosen: NDArray[np.bool_]) -> Series:
+        """Of some of the certificates alone."""
+        names = ("day", "value", "u", "u_artefact", "artefact", "entry", "adjusted_since", "interim")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
 @dataclass(frozen=True, slots=True)

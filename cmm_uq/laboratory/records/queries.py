@@ -11,7 +11,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, Engine, Select, Table, func, select
 
@@ -19,9 +19,6 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.laboratory.records import facts, tables
 from cmm_uq.laboratory.records.place import told
 from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _TOGETHER = 2000  # certificates whose values are asked for in one query
 _C = certificates.c
@@ -195,40 +192,18 @@ class RecordQueries:
         self, machine: str, names: Collection[str] | None = None, origin: str = "measured"
     ) -> dict[str, facts.Series]:
         """Each value of a machine over its standing certificates and interim checks."""
-        by_name: dict[str, list[Any]] = defaultdict(list)
         with self.reading() as connection:
             number = _machine_id(connection, machine)
-            for row in connection.execute(_stated(names, origin).where(_C.machine == number)):
-                "".join((row.name, row.quantity, row.unit))  # raises of bytes, which SQLite lets somebody put there
-                by_name[row.name].append(row)
-            adjusted = _adjusted(connection, [number])[number]
-            return {
-                name: facts.Series.of(name, rows[-1].quantity, rows[-1].unit, [row.limit for row in rows], [
-                    (dt.date.fromisoformat(row.day), row.value, row.u, row.u_artefact, row.artefact, row.entry,
-                     adjusted_before(row.adjusted_since, row.day, adjusted), bool(row.interim)) for row in rows
-                ]) for name, rows in by_name.items()
-            }  # fmt: skip
+            return _series(connection, _stated(names, origin).where(_C.machine == number))[number]
 
-    def all_series(self, names: Collection[str] | None = None, origin: str = "measured") -> pd.DataFrame:
-        """Values of all machines, a row each, by machine, name, day, entry; days are ordinals, 0 where unknown."""
-        import pandas as pd
-
+    def all_series(
+        self, names: Collection[str] | None = None, origin: str = "measured"
+    ) -> dict[str, dict[str, facts.Series]]:
+        """The same of all machines, by serial."""
         with self.reading() as connection:
-            rows = connection.execute(_stated(names, origin)).all()
-            known = {row.id: row for row in connection.execute(select(machines))}
-            adjusted = _adjusted(connection, set(known))
-            ordinal = {day: dt.date.fromisoformat(day).toordinal() for day in {row.day for row in rows}}
-            since = [adjusted_before(row.adjusted_since, row.day, adjusted[row.machine]) for row in rows]
-            stated = ("name", "value", "u", "u_artefact", "artefact", "limit", "entry")
-            frame = pd.DataFrame({
-                "machine": [known[row.machine].called for row in rows], "model": [known[row.machine].model for row in rows],
-                "place": [known[row.machine].place for row in rows], "day": [ordinal[row.day] for row in rows],
-                **{name: [getattr(row, name) for row in rows] for name in stated},
-                "adjusted_since": [day.toordinal() if day else 0 for day in since],
-                "interim": [bool(row.interim) for row in rows],
-            })  # fmt: skip
-            frame = frame.astype(dict.fromkeys(("value", "u", "u_artefact", "limit"), float))
-            return frame.sort_values(["machine", "name", "day", "entry"], kind="stable", ignore_index=True)
+            called = {row.id: row.called for row in connection.execute(select(machines.c.id, machines.c.called))}
+            found = _series(connection, _stated(names, origin))
+        return {called[number]: found[number] for number in sorted(found, key=called.__getitem__)}
 
     def _certificates(
         self, connection: Connection, query: Select[Any], *, values: bool = True
@@ -250,6 +225,22 @@ class RecordQueries:
             for (entry, machine, _, command, job, number, kind, origin, day, at, since, state, decision, diagnosis, interim,
                  folder, version, results, due, machine_called, artefact_called) in rows
         ]  # fmt: skip
+
+
+def _series(connection: Connection, query: Select[Any]) -> dict[int, dict[str, facts.Series]]:
+    """Of each machine, by the number of its row, the values by name."""
+    each: dict[tuple[int, str], list[Any]] = defaultdict(list)
+    for row in connection.execute(query):
+        "".join((row.name, row.quantity, row.unit))  # raises of bytes, which SQLite lets somebody put there
+        each[row.machine, row.name].append(row)
+    adjusted = _adjusted(connection, {machine for machine, _ in each})
+    found: dict[int, dict[str, facts.Series]] = defaultdict(dict)
+    for (machine, name), rows in each.items():
+        found[machine][name] = facts.Series.of(name, rows[-1].quantity, rows[-1].unit, [row.limit for row in rows], [
+            (dt.date.fromisoformat(row.day), row.value, row.u, row.u_artefact, row.artefact, row.entry,
+             adjusted_before(row.adjusted_since, row.day, adjusted[machine]), bool(row.interim)) for row in rows
+        ])  # fmt: skip
+    return found
 
 
 def newest_of_machine(until: dt.date | None = None, states: Collection[str] = facts.STANDING) -> Any:

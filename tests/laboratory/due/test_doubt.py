@@ -150,7 +150,7 @@ def test_drafts_of_one_recording_count_once(tmp_path: Path) -> None:
         made = [recorded(day=day, values=stating(number)) for day, number in each]
         entries = records.append_all([("report", one, moment(january)) for one in made])
         assert records.series("1102")["scale_x.ppm"].value.tolist() == [1.0, 5.1]
-        assert records.all_series()["value"].tolist() == [1.0, 5.1]
+        assert records.all_series()["1102"]["scale_x.ppm"].value.tolist() == [1.0, 5.1]
         signed = {"certificate": entries[1].number, "by": "A. Releaser", "reason": "checked", "complete": True}
         records.append_all([("release", signed, moment(march))])
         assert records.series("1102")["scale_x.ppm"].value.tolist() == [1.0, 5.0]

@@ -56,7 +56,7 @@ def test_a_server_keeps_the_same_entries_and_answers_the_same_as_a_file(url: str
         assert server.machines() == file.machines()
         assert server.artefacts() == file.artefacts()
         assert [one.values for one in server.latest()] == [one.values for one in file.latest()]
-        assert server.all_series().equals(file.all_series())
+        assert repr(server.all_series()) == repr(file.all_series())
         assert server.certificates("100001", states=["released"]) == [
             one for one in server.certificates("100001") if one.state == "released"
         ]

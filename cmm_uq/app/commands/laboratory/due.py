@@ -23,13 +23,11 @@ from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, 
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine
+from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine, Series
 from cmm_uq.laboratory.records.listing import outcomes_of
 from cmm_uq.laboratory.records.place import NONE
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from cmm_uq.app.commands.files import Stage
     from cmm_uq.certificate.document import Document
     from cmm_uq.laboratory.due.drift import DriftPrior as Prior
@@ -278,34 +276,31 @@ def fleet(
     from cmm_uq.laboratory.due.fleet import fit_fleet, judged
 
     with open_records(where, read_only=True) as records:
-        frame = records.all_series(names or None)
-        adjusted = {one.serial: one.adjusted[-1].toordinal() for one in records.machines() if one.adjusted}
-        known = set(frame["name"]) if not names else set(records.all_series()["name"]) if frame.empty else set()
-        called = {
-            name: (series.quantity, series.unit)
-            for machine in frame.drop_duplicates("name")["machine"]
-            for name, series in records.series(machine).items()
-        }
-        newest = frame.drop_duplicates(["machine", "name"], keep="last")
-        stated = outcomes_of(records, set(newest["entry"].tolist()))
-    wanted = _wanted(frame, names, known)
+        every, machines = records.all_series(names or None), {one.serial: one for one in records.machines()}
+        known = [] if every else [name for of in records.all_series().values() for name in sorted(of)]
+        stated = outcomes_of(records, {int(one.entry[-1]) for of in every.values() for one in of.values()})
+    called: dict[str, tuple[str, str]] = {}
+    for of in every.values():
+        if of.keys() - called.keys():  # the first machine with a value says what it is called
+            called |= {name: (series.quantity, series.unit) for name, series in of.items()}
+    wanted = _wanted(every, names, known)
     learnt = []
     for i, name in enumerate(wanted):
-        rows = frame[frame["name"] == name]
-        usable = rows[np.isfinite(rows["value"]) & np.isfinite(rows["u"]) & (rows["u"] > 0)]
-        members = tuple(_members(usable, adjusted, stated))
-        quantity, unit = called.get(name, (name, ""))
+        rows = {serial: of[name] for serial, of in every.items() if name in of}
+        members = tuple(_members(rows, machines, stated))
+        quantity, unit = called[name]
         stage(f"Sampling: {quantity}", i / len(wanted))
         if not members:
             fix = "Choose another --name"
             raise CmmUqError("no certificate states this value with an uncertainty", where=name, fix=fix)
-        learnt.append((name, quantity, unit, members, fit_fleet(members, seed), len(rows) - len(usable)))
+        left = sum(len(one.day) for one in rows.values()) - sum(len(one.history.day) for one in members)
+        learnt.append((name, quantity, unit, members, fit_fleet(members, seed), left))
     stage("Done", 1.0)
     return judged(learnt, seed)
 
 
-def _wanted(frame: pd.DataFrame, names: Collection[str], known: Collection[str]) -> list[str]:
-    there = list(dict.fromkeys(frame["name"]))
+def _wanted(every: Mapping[str, Mapping[str, Series]], names: Collection[str], known: Collection[str]) -> list[str]:
+    there = list(dict.fromkeys(name for of in every.values() for name in sorted(of)))
     for name in names:
         if name not in there:
             known = known or there
@@ -315,28 +310,28 @@ def _wanted(frame: pd.DataFrame, names: Collection[str], known: Collection[str])
                          fix="Record some: cmm-uq report JOB, or cmm-uq records import")  # fmt: skip
     if names:
         return list(dict.fromkeys(names))
-    limited = set(frame.loc[frame["limit"].notna(), "name"])
+    limited = {name for of in every.values() for name, series in of.items() if series.limit is not None}
     return sorted(limited or there)
 
 
 def _members(
-    rows: pd.DataFrame, adjusted: Mapping[str, int], stated: Mapping[int, Mapping[str, str]]
+    rows: Mapping[str, Series], machines: Mapping[str, RecordedMachine], stated: Mapping[int, Mapping[str, str]]
 ) -> Iterator[FleetMember]:
     """Machines with what their certificates say; the newest limit, model and place count, and the newest adjustment."""
     from cmm_uq.laboratory.due.drift import history
     from cmm_uq.laboratory.due.fleet import FleetMember
 
-    for machine, of in rows.groupby("machine", sort=True):
+    for serial, whole in rows.items():
+        of, machine = whole.where(np.isfinite(whole.value) & np.isfinite(whole.u) & (whole.u > 0)), machines[serial]
+        if not len(of.day):
+            continue
         # what certificates take from an artefact is at most their whole uncertainty
-        shared = of["u_artefact"].fillna(0.0).clip(0.0, of["u"])
-        rows_of = of.assign(u_artefact=shared, adjusted_since=np.minimum(of["adjusted_since"], of["day"]))
-        last, known = of.iloc[-1], history(rows_of, adjusted.get(str(machine)))
-        limits = of["limit"].dropna()
-        yield FleetMember(
-            str(machine), str(last["model"] or ""), str(last["place"] or ""), known,
-            float(limits.iloc[-1]) if len(limits) and limits.iloc[-1] > 0 else None,
-            stated.get(int(last["entry"]), {}).get(str(last["name"]), ""),
-        )  # fmt: skip
+        shared = np.where(np.isnan(of.u_artefact), 0.0, of.u_artefact).clip(0.0, of.u)
+        known = replace(of, u_artefact=shared, adjusted_since=np.minimum(of.adjusted_since, of.day))
+        adjusted = machine.adjusted[-1].toordinal() if machine.adjusted else None
+        limit = of.limit if of.limit is not None and of.limit > 0 else None
+        decided = stated.get(int(of.entry[-1]), {}).get(of.name, "")
+        yield FleetMember(serial, machine.model, machine.place, history(known, adjusted), limit, decided)
 
 
 def write_fleet(found: FleetResult, folder: Path, *, force: bool = False) -> dict[str, Path]:
