@@ -31,6 +31,7 @@ BEGIN, END = "<!-- written by python -m benchmarks.waiting --page: edit that ins
 JOB = ROOT / "examples" / "iota-1102-20C"
 FLOOR = "import numpy, scipy.linalg, scipy.optimize, matplotlib.figure, pydantic, sqlalchemy"
 MACHINES, EACH, JOBS = 40, 5, (1, 4)
+DATES = "dates.json"  # what is kept of dates by drift
 LANGUAGES = {"de": "German", "fr": "French", "ja": "Japanese"}
 
 
@@ -47,7 +48,8 @@ def commands(place: Path) -> dict[str, list[str]]:
         "`check`": _of("check", str(JOB)),
         "`new ballbar`": _of("new", "ballbar", str(place / "new")),
         "`due`, 40 machines at fixed intervals": _of("due", *lab),
-        "`due`, 40 machines by drift": _of("due", "--records", str(place / "drift.db")),
+        **{f"`due`, 40 machines by drift, {when}": _of("due", "--records", str(place / "drift.db"))
+           for when in ("found anew", "as kept")},
         "`history` with pictures": _of("history", "100005", *lab, "--out", str(place / "history"), "--force"),
         "`fleet`, 40 machines, one value": _of("fleet", *lab, "--name", "scale_x.ppm", "--out", str(place / "f"), "--force"),
         **{f"`batch` of {n}, one worker": _of("batch", str(place / f"jobs{n}"), "--workers", "1", "--out", str(place / "b"))
@@ -81,7 +83,8 @@ def prepare(place: Path) -> None:
 
 def spent(arguments: list[str], place: Path) -> tuple[float, float]:
     """User and system time in s of a process and of those that it started, and its peak memory in MiB; with records."""
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "CMM_UQ_RECORDS": str(place / "own.db")}
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "CMM_UQ_RECORDS": str(place / "own.db"),
+                   "CMM_UQ_DATES": str(place / DATES)}  # fmt: skip
     process = subprocess.Popen([sys.executable, *arguments], env=environment, stdout=subprocess.DEVNULL, cwd=ROOT)
     _, status, usage = os.wait4(process.pid, 0)
     if os.waitstatus_to_exitcode(status) not in (0, 3):  # 3: verified, but not all of it
@@ -95,6 +98,7 @@ def measured(place: Path, times: int) -> dict[str, tuple[float, float]]:
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in every}
     for _ in range(times):
         shutil.rmtree(place / "new", ignore_errors=True)
+        (place / DATES).unlink(missing_ok=True)
         for name, arguments in every.items():
             found[name].append(spent(arguments, place))
             shutil.rmtree(place / "b", ignore_errors=True)
