@@ -30,10 +30,11 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import (
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member, effect_of
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, FunctionTerm
-from cmm_uq.analysis.diagnosis.empirical.model import ODDS
+from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, FunctionTerm
+from cmm_uq.analysis.diagnosis.empirical.model import MOST, ODDS, of_effect
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
@@ -198,7 +199,7 @@ def _evidence(comparison: CandidateComparison, given: Sequence[Version], sets: S
 
 NAMED = 0.8  # probability from which an effect is named, alone or as one of a group
 IMPROBABLE = say("it is too improbable to be named, alone or together with what the readings do not tell from it")
-UNSEEN = say("others of its kind make it probable, and the readings alone do not speak for it by 20 to 1")
+UNSUPPORTED = say("others of its kind make it probable, and the readings alone do not speak for it by 20 to 1")
 _TOLD_APART = 0.95
 # Odds of another in the place of an effect from which both are named together: a set-up is suggested that gives 20 : 1
 _ODDS = 0.05
@@ -315,24 +316,39 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
     data = FunctionFit.of(result, result.first.families) if result.chosen and not gone else None
     if data is None or not data.families or not data.degrees:
         return gone, False
-    beside = _likeliest(data) if data.total - data.nothing > np.log(ODDS) else None
+    beside, finer = list[FunctionTerm](), data.refined()
+    while len(beside) < MOST and finer.total - finer.nothing > np.log(ODDS):
+        beside.append(_likeliest(finer))
+        data = replace(finer.with_function(finer.versions(1)[0]), families=data.families)
+        finer = data.refined()
+    known, prior = result.first.explanations, log_prior(result.first.explanations) - np.log(SHARES[UNKNOWN])
     for i in sorted(result.chosen):
-        effect = effect_of(result.first.explanations[i])
+        effect = effect_of(known[i])
         if effect.everywhere or not _known(result, i):  # a straight line has no other form
             continue
-        of = {*effect.columns, *(one.of for one in effect.imitated_by)}
         without = replace(data, free=withhold(result, frozenset({i})).last.baseline)
-        if without.total > _own(result, i, without):
-            other: FunctionTerm | None = _likeliest(without)
-        else:  # an idealised effect has other forms, which make it one in part
-            other = beside if beside and effect.idealised_over is None and of & set(beside.of.split(",")) else None
+        shown = without.rest(known[i].members[0].columns / result.first.comparison.noise_scale[:, None])
+        # a product of which it is a part is no other form: what that has besides would show beside it
+        others = [f for f in data.families if f.form != PRODUCT or not _part(shown, without.rest(f.columns[:, 0]))]
+        without = replace(without, families=others).refined()
+        # how rare it is was counted where effects were compared
+        own, other_forms = prior[i] - np.log(known[i].weight) + of_effect(result, i, without)
+        of = {*effect.columns, *(one.of for one in effect.imitated_by)}
+        other = next((one for one in beside if of & set(one.of.split(","))), None)
+        if other is None and own < np.log(NAMED) + np.logaddexp.reduce([own, other_forms, without.total]):
+            other = _likeliest(without)
         if other is not None:
             why = say("the readings show another form: {function}", function=other.title)
             gone[i] = withheld_effect(result, i, why)
-    return gone, beside is not None
+    return gone, bool(beside)
 
 
-def unseen(result: SearchResult) -> dict[int, WithheldEffect]:
+def _part(columns: Floats, whole: Floats) -> bool:
+    left = columns - whole @ np.linalg.lstsq(whole, columns, rcond=None)[0]
+    return bool(np.sum(left**2) < _ALIKE * np.sum(columns**2))
+
+
+def least_supported(result: SearchResult) -> dict[int, WithheldEffect]:
     """The scale or squareness that the readings alone speak for least, where they do not by 20 : 1.
 
     Those of a machine out of adjustment make each other probable, and none of them is ever exactly zero: that is no evidence.
@@ -346,7 +362,7 @@ def unseen(result: SearchResult) -> dict[int, WithheldEffect]:
     if weakest < 0:
         return {}
     alone = float(scipy.special.expit(least))
-    return {weakest: replace(withheld_effect(result, weakest, UNSEEN), probability=alone)}
+    return {weakest: replace(withheld_effect(result, weakest, UNSUPPORTED), probability=alone)}
 
 
 def _known(result: SearchResult, index: int) -> bool:
@@ -357,16 +373,3 @@ def _known(result: SearchResult, index: int) -> bool:
 
 def _likeliest(data: FunctionFit) -> FunctionTerm:
     return data.families[data.versions(1)[0].family].term
-
-
-def _own(result: SearchResult, index: int, data: FunctionFit) -> float:
-    """Log evidence of an effect, in the forms that it may have, as if it were a function of :class:`FunctionFit`."""
-    members, scale = result.first.explanations[index].members, result.first.comparison.noise_scale[:, None, None]
-    whole, logs = sum(one.weight for one in members), []
-    for width in {one.columns.shape[1] for one in members}:
-        some = [one for one in members if one.columns.shape[1] == width]
-        columns = np.stack([one.columns for one in some], axis=1) / scale
-        family = FunctionFamily(data.families[0].term, "", columns, 0.0, np.zeros(0), np.zeros((0, *columns.shape[1:])))
-        weight = np.log([one.weight / whole for one in some])
-        logs.append(scipy.special.logsumexp(data.of_family(family)[0] + weight[:, None]))
-    return float(scipy.special.logsumexp(logs))

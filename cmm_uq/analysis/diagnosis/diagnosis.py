@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis import joint as jointly
-from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, doubted, indistinguishable, left_out, unseen
+from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, doubted, indistinguishable, least_supported, left_out
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
@@ -236,7 +236,7 @@ def diagnose(
     rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
     repeats, wrong = against_repeats(found.model), first.p_value < alpha
     shared = repeats is not None and repeats.p_value < alpha
-    doubtful = bool(found.rough) or found.unexplained > _UNKNOWN or shared or beside
+    doubtful = found.unexplained > _UNKNOWN or shared or beside
     empirical = empirical_model(found) if wrong and (doubtful or not found.effects) else None
     modelled = empirical is not None and empirical.predicts
     verdict = "undetermined" if shared else "consistent"
@@ -262,7 +262,7 @@ def _asserted(
     places: dict[int, WithheldEffect] = {}  # of each effect that was tried in the place of others, the first of these
     tried: frozenset[int] = frozenset()
     while True:
-        while weak := unseen(result):  # what it stands for is within the noise: nothing more is unexplained without it
+        while weak := least_supported(result):  # within the noise: nothing more is unexplained without it
             result = replace(withhold(result, frozenset(weak)), unexplained=result.unexplained)
             gone = (*gone, *weak.values())
         doubtful, beside = doubted(result)

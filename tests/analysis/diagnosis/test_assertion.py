@@ -143,7 +143,7 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
         "effects_without_size": open_size,
         "joint_posterior": lambda *_: None,
         "doubted": lambda _found: ({}, False),
-        "unseen": lambda _found: {},
+        "least_supported": lambda _found: {},
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
     }.items():
         monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
@@ -169,7 +169,7 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
         "effects_without_size": open_size,
         "joint_posterior": lambda *_: None,
         "doubted": lambda _found: ({}, False),
-        "unseen": lambda _found: {},
+        "least_supported": lambda _found: {},
         "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
         "substitute": lambda *_: None,
     }.items():

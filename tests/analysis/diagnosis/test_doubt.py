@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.asserted import NAMED, doubted, unseen
-from cmm_uq.analysis.diagnosis.comparison.search import search, withhold
+from cmm_uq.analysis.diagnosis.asserted import NAMED, doubted, least_supported
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, withhold
 from cmm_uq.analysis.diagnosis.diagnosis import diagnose
+from cmm_uq.analysis.diagnosis.empirical.model import empirical_model
 from cmm_uq.analysis.diagnosis.joint import WithheldEffect
 from cmm_uq.artefacts.ballbar import Ballbar
-from cmm_uq.base.points import Machine, Points
+from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.diagnosis.test_assertion import found_with
@@ -78,6 +80,71 @@ def test_waves_that_grow_shorter_are_no_period(shorter: float, *, named: bool) -
     assert ("periodic_scale_y" in {one.effect for one in doubted(found)[0].values()}) is not named
 
 
+def shifted(random: np.random.Generator, axis: int, error: Callable[[Points], Floats]) -> RecordingModel:
+    """A hundred bars, their balls in any order of time, in which one axis is off, in micrometres."""
+    once = bars(random, 100, 400.0, Machine("m", "XYZ", TRAVEL))
+    points = with_columns(once, time_s=40.0 * random.permutation(len(once)))
+    off = 1e-3 * error(points)[:, None] * np.eye(3)[axis]
+    return model(points.at(once.xyz - off + 1.5e-3 * random.standard_normal(once.xyz.shape)))
+
+
+def named(found: SearchResult) -> set[str]:
+    """Effects, less those that are doubted, until none is."""
+    while gone := doubted(found)[0]:
+        found = withhold(found, frozenset(gone))
+    return set(found.effects)
+
+
+def walk(seed: int, count: int) -> Floats:
+    return np.cumsum(np.random.default_rng(seed).standard_normal(count))
+
+
+@pytest.mark.parametrize(
+    ("of_hours", "said"),
+    [
+        (lambda t: 4 * t, {"drift_y"}),
+        (lambda t: 12 * np.maximum(t - 1.3, 0), set()),
+        (lambda t: 6 * (t - 1.1) ** 3, set()),
+        (lambda t: 1.2 * walk(3, len(t))[np.argsort(np.argsort(t))], set()),
+    ],
+    ids=["even", "after an hour", "at both ends", "a random walk"],
+)
+def test_a_drift_goes_on_evenly(of_hours: Callable[[Floats], Floats], said: set[str]) -> None:
+    """What begins late, or walks, is a function of time and no drift."""
+    own = shifted(np.random.default_rng(11), 1, lambda p: of_hours(p.columns["time_s"] / 3600))
+    assert named(search(own, 1.5e-3, alpha=0.01, seed=0)) == said
+
+
+@pytest.mark.parametrize(("width", "said"), [(75.0, {"wear_x_y"}), (30.0, set())])
+def test_wear_has_its_width(width: float, said: set[str]) -> None:
+    """A twelfth of the travel of 900 mm."""
+    own = shifted(np.random.default_rng(12), 1, lambda p: 12 * np.exp(-0.5 * ((p.xyz[:, 0] - 480) / width) ** 2))
+    assert named(search(own, 1.5e-3, alpha=0.01, seed=0)) == said
+
+
+def test_what_else_is_unexplained_takes_no_effect_its_name() -> None:
+    """A larger sawtooth of X along Z beside an even drift of Y: each is compared with what is left beside the other."""
+    random = np.random.default_rng(13)
+    own = shifted(random, 1, lambda p: 4 * p.columns["time_s"] / 3600)
+    points = own.artefact.points
+    teeth = 0.01 * np.mod(points.xyz[:, 0] / 170, 1)
+    own = model(points.at(points.xyz - teeth[:, None] * [0, 0, 1]))
+    found = search(own, 1.5e-3, alpha=0.01, seed=0)
+    assert "drift_y" in named(found)
+
+
+@pytest.mark.parametrize(("axis", "form"), [(1, None), (2, "step")], ids=["a joint of the scale of Y", "none"])
+def test_a_form_is_named_that_is_no_effect(axis: int, form: str | None) -> None:
+    """A step of Y along Y is as well two pieces of a scale that do not meet: the function lists its form alone."""
+    own = shifted(np.random.default_rng(14), axis, lambda p: 9.0 * (p.xyz[:, 1] > 300))
+    found = search(own, 1.5e-3, alpha=0.01, seed=0)
+    functions = empirical_model(withhold(found, found.chosen))
+    assert functions is not None
+    one = functions.functions[0]
+    assert (one.forms[0][0], one.term.along) == ("step", "xyz"[axis])
+    assert (one.form and one.form.name) == form
+
+
 @pytest.mark.long
 def test_what_is_withheld_so_is_modelled_as_a_function() -> None:
     found = diagnose(model(recording(growing=True)), stated_um=1.5, alpha=0.01, seed=0)
@@ -96,7 +163,7 @@ def test_errors_that_only_others_of_their_kind_make_probable_are_not_named(seed:
     found = search(RecordingModel(Ballbar(bar_facts(), read), ()), None, alpha=0.01, seed=1)
     probable, gone = found.combinations, dict[int, WithheldEffect]()
     assert probable is not None
-    while weak := unseen(found):
+    while weak := least_supported(found):
         gone |= weak
         found = withhold(found, frozenset(weak))
     assert set(found.effects) == {"squareness_yz", "squareness_zx"}

@@ -72,7 +72,6 @@ class SearchResult:
     versions: tuple[Version, ...]  # of them, and of what is unknown besides, in the most probable combination
     model: RecordingModel  # the job's model with what was left out
     unexplained: float  # probability that something unknown acts besides
-    rough: Key = frozenset()  # of the effects found, those of which another form is more probable than their own
     stated: float | None = None  # standard uncertainty of a coordinate, mm, as the job states it
 
     @property
@@ -134,16 +133,10 @@ def _estimated(first: ModelComparison, combinations: Combinations, chosen: Key, 
 
 
 def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> SearchResult:
-    versions, rough = combinations.versions(chosen), set()
+    versions = combinations.versions(chosen)
     found = first.model if not chosen else with_effects(first, versions, chosen)
-    for i in chosen:
-        member, evidence, weight = first.comparison.of_versions(i, [v for v in versions if v.explanation != i])
-        probability = np.exp(evidence + weight - scipy.special.logsumexp(evidence + weight))
-        other = float(probability[[first.explanations[i].members[m].rough for m in member]].sum())
-        if other > ASSERTED or any(combinations.of(j) > combinations.of(i) for j in combinations.imitating(i)):
-            rough.add(i)
     last, beside = comparison_of(found, stated, ()), combinations.unknown_beside(chosen)
-    return SearchResult(first, last, combinations, chosen, versions, found, beside, frozenset(rough), stated)
+    return SearchResult(first, last, combinations, chosen, versions, found, beside, stated)
 
 
 def withhold(result: SearchResult, withheld: Key) -> SearchResult:
@@ -157,8 +150,7 @@ def withhold(result: SearchResult, withheld: Key) -> SearchResult:
         last = comparison_of(model, result.stated, ()) if chosen else first.comparison
     except CmmUqError:  # what went had kept the others to sizes that a machine can have
         return replace(_estimated(first, combinations, chosen, result.stated), unexplained=1.0)
-    rough = result.rough - withheld
-    return replace(result, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=rough)
+    return replace(result, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0)
 
 
 def substitute(result: SearchResult, index: int, tried: Key) -> tuple[SearchResult, int] | None:

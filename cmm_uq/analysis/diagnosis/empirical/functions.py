@@ -54,38 +54,19 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
         parts = np.array_split(np.arange(len(gaps)), _STEPS)
         widest = np.array([part[np.argmax(gaps[part])] for part in parts])
         between, gaps = between[widest], np.maximum(gaps[widest], np.gradient(between[widest]))
-    yield ClosedForm(
-        "step",
-        ("at",),
-        between[:, None],
-        gaps[:, None],
-        lambda c, s: 0.5 * (1 + np.sign(c - s[:, 0])),
-        "(1 + sign(c - at))/2",
-    )
+    at, apart = between[:, None], gaps[:, None]
+    yield ClosedForm("step", ("at",), at, apart, lambda c, s: 0.5 * (1 + np.sign(c - s[:, 0])), "(1 + sign(c - at))/2")
     at = low + span * np.arange(1, _HINGES + 1) / (_HINGES + 1)
     yield _even("ramp", ("start",), at, lambda c, s: np.maximum(c - s[:, 0], 0) / span, f"max(c - start, 0)/{span!r}")
-    at = low + span * (np.arange(_PLACES) + 0.5) / _PLACES
-    yield _even(
-        "dent",
-        ("at", "width"),
-        (at, span * np.array(_WIDTHS)),
-        lambda c, s: np.exp(-0.5 * ((c - s[:, 0]) / s[:, 1]) ** 2),
-        "exp(-((c - at)/width)**2/2)",
-    )
+    nodes, formula = (_middles(low, span, _PLACES), span * np.array(_WIDTHS)), "exp(-((c - at)/width)**2/2)"
+    yield _even("dent", ("at", "width"), nodes, lambda c, s: np.exp(-0.5 * ((c - s[:, 0]) / s[:, 1]) ** 2), formula)
     yield _even("bow", (), (), lambda c, s: ((c - middle) / half) ** 2, f"((c - {middle!r})/{half!r})**2")
     yield _even("cubic", (), (), lambda c, s: ((c - middle) / half) ** 3, f"((c - {middle!r})/{half!r})**3")
-    at = low + span * (np.arange(_SATURATES) + 0.5) / _SATURATES
-    yield _even(
-        "saturating",
-        ("at", "width"),
-        (at, span * np.array(_SOFT)),
-        lambda c, s: np.tanh((c - s[:, 0]) / s[:, 1]),
-        "tanh((c - at)/width)",
-    )
+    nodes, formula = (_middles(low, span, _SATURATES), span * np.array(_SOFT)), "tanh((c - at)/width)"
+    yield _even("saturating", ("at", "width"), nodes, lambda c, s: np.tanh((c - s[:, 0]) / s[:, 1]), formula)
     settles, reach = "exponential" if time else "saturating", span * np.array(_REACHES)
-    yield _even(
-        settles, ("reach",), reach, lambda c, s: 1 - np.exp(-(c - low) / s[:, 0]), f"1 - exp(-(c - {low!r})/reach)"
-    )
+    formula = f"1 - exp(-(c - {low!r})/reach)"
+    yield _even(settles, ("reach",), reach, lambda c, s: 1 - np.exp(-(c - low) / s[:, 0]), formula)
     yield _even(settles, ("reach",), reach, lambda c, s: np.exp((c - high) / s[:, 0]), f"exp((c - {high!r})/reach)")
     period = span / np.arange(_WHOLE, min(_SINES, 0.5 * len(distinct)), _BETWEEN)
     for orders in ((1,), (1, 2)) if len(period) > 1 else ():
@@ -96,14 +77,17 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
         grid, apart = _grid(period, np.arange(_PHASES) / _PHASES)
         grid[:, 1], apart[:, 1] = grid[:, 1] * grid[:, 0], apart[:, 1] * grid[:, 0]
         yield ClosedForm("sawtooth", ("period", "at"), grid, apart, _teeth, "2/pi*atan(tan(pi*(c - at)/period))")
-    width = half * np.arange(1, _DEAD + 1) / (_DEAD + 1)
-    yield _even(
-        "dead_zone",
-        ("at", "width"),
-        (np.unique(np.append(middle + half * np.array(_CENTRES), np.clip(0.0, low, high))), width),
-        lambda c, s: np.sign(c - s[:, 0]) * np.maximum(np.abs(c - s[:, 0]) - s[:, 1], 0) / span,
-        f"sign(c - at)*max(abs(c - at) - width, 0)/{span!r}",
-    )
+    width, formula = half * np.arange(1, _DEAD + 1) / (_DEAD + 1), f"sign(c - at)*max(abs(c - at) - width, 0)/{span!r}"
+    nodes = np.unique(np.append(middle + half * np.array(_CENTRES), np.clip(0.0, low, high))), width
+    yield _even("dead_zone", ("at", "width"), nodes, lambda c, s: _beyond(c - s[:, 0], s[:, 1]) / span, formula)
+
+
+def _middles(low: float, span: float, parts: int) -> Floats:
+    return low + span * (np.arange(parts) + 0.5) / parts
+
+
+def _beyond(away: Floats, width: Floats) -> Floats:
+    return np.asarray(np.sign(away) * np.maximum(np.abs(away) - width, 0))
 
 
 def _waves(orders: Sequence[int], c: Floats, s: Floats) -> Floats:
@@ -133,11 +117,8 @@ def _grid(*nodes: Floats) -> tuple[Floats, Floats]:
     )  # type: ignore[return-value]
 
 
-_ROUGH, _GRID, _KEPT = (
-    (0.4, 0.15, 0.05),
-    100,
-    3e-3,
-)  # lengths, in parts of the range; nodes; part of what shows that is kept
+# Lengths, in parts of the range; nodes; part of what shows that is kept
+_ROUGH, _GRID, _KEPT = (0.4, 0.15, 0.05), 100, 3e-3
 _TURNED = 0.3  # how readily a curve of rotation is thought of, beside a displacement
 _SEEN = 1e-9  # mm, length of columns for a size that physics allows
 _PARTS = (np.arange(9) - 4) / 9  # of the distance of two nodes
@@ -247,8 +228,7 @@ def _rough_functions(covariate: Floats) -> Iterator[Floats]:
 def _of_points(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
     scale, points = comparison.noise_scale, model.artefact.points.at(model.where(values))
     readings = {axis: read for axis, read in points.readings.items() if np.ptp(read) > 1.0}
-    middle = {axis: 0.5 * (read.min() + read.max()) for axis, read in readings.items()}
-    arms = {axis: (read - middle[axis]) / (0.5 * np.ptp(read)) for axis, read in readings.items()}
+    arms = {axis: (read - 0.5 * (read.min() + read.max())) / (0.5 * np.ptp(read)) for axis, read in readings.items()}
 
     def moving(along: str, lever: Floats | float = 1.0) -> Seen:
         def seen(f: Floats) -> Floats:
@@ -264,9 +244,9 @@ def _of_points(model: RecordingModel, values: Floats, comparison: CandidateCompa
     }  # fmt: skip
     for along in AXES:
         for axis, read in readings.items():
-            yield from _families(_curve(along, axis), moving(along), read)
+            yield from _families(_curve(along, _letter(axis), reading_name(axis), _variable(axis)), moving(along), read)
             for lever in (other for other in readings if other not in (axis, along)):
-                term = _turning(along, axis, lever, middle[lever], 0.5 * float(np.ptp(readings[lever])))
+                term = _turning(along, axis, lever, readings[lever])
                 yield from _families(term, moving(along, arms[lever]), read, forms=False, weight=_TURNED)
         for axis, other in (pair for pair in ("xy", "yz", "zx") if readings.keys() >= set(pair)):
             u, v = arms[axis], arms[other]
@@ -276,13 +256,12 @@ def _of_points(model: RecordingModel, values: Floats, comparison: CandidateCompa
                 formula = f"{p}*{q}" if name == PRODUCT else f"{p}**2;{q}**2"
                 nowhere = np.zeros((0, 1, f.shape[1]))
                 yield FunctionFamily(of, name, columns, -float(np.log(2)), np.zeros(0), nowhere, formula=formula)
+        since = f"(time_s + {points.start!r})" if points.start else "time_s"
+        if "time_s" in varied:  # all that stands on the axis shifts
+            yield from _families(_curve(along, in_words("time_s"), "time_s", since), moving(along), varied["time_s"])
         for key, column in varied.items() if along in readings else ():
-            half, timed = 0.5 * float(np.ptp(readings[along])), key == "time_s"
-            of_time = say("scale of {axis} as a function of time", axis=_letter(along))
-            other = say("scale of {axis} as a function of {name}", axis=_letter(along), name=in_words(key))
-            since = f"(time_s + {points.start!r})" if timed and points.start else key
-            term = FunctionTerm(key, of_time if timed else other, along, along, f"*{along}/{half!r}", since)
-            yield from _families(term, moving(along, readings[along] / half), column)
+            half, name = 0.5 * float(np.ptp(readings[along])), since if key == "time_s" else key
+            yield from _families(_scale(along, key, half, name), moving(along, readings[along] / half), column)
 
 
 def _of_approach(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
@@ -321,28 +300,27 @@ def _letter(axis: str) -> Text:
 
 
 def _of_both(along: str, one: Text, other: str) -> Text:
-    return say(
-        "error along {direction} as a function of {axis} and {other}",
-        direction=_letter(along),
-        axis=one,
-        other=_letter(other),
-    )
+    of = {"direction": _letter(along), "axis": one, "other": _letter(other)}
+    return say("error along {direction} as a function of {axis} and {other}", **of)
 
 
-def _curve(along: str, axis: str) -> FunctionTerm:
-    words = say("error along {direction} as a function of {axis}", direction=_letter(along), axis=_letter(axis))
-    return FunctionTerm(reading_name(axis), words, along, variable=_variable(axis))
+def _curve(along: str, one: Text, of: str, variable: str) -> FunctionTerm:
+    words = say("error along {direction} as a function of {axis}", direction=_letter(along), axis=one)
+    return FunctionTerm(of, words, along, variable=variable)
 
 
-def _turning(along: str, axis: str, lever: str, middle: float, half: float) -> FunctionTerm:
-    title = say(
-        "error along {direction} as a function of {axis}, in proportion to {lever}",
-        direction=_letter(along),
-        axis=_letter(axis),
-        lever=_letter(lever),
-    )
-    arm = f"*({_variable(lever)} - {middle!r})/{half!r}"
-    return FunctionTerm(reading_name(axis), title, along, lever, arm, _variable(axis))
+def _scale(axis: str, key: str, half: float, variable: str) -> FunctionTerm:
+    of_time = say("scale of {axis} as a function of time", axis=_letter(axis))
+    other = say("scale of {axis} as a function of {name}", axis=_letter(axis), name=in_words(key))
+    return FunctionTerm(key, of_time if key == "time_s" else other, axis, axis, f"*{axis}/{half!r}", variable)
+
+
+def _turning(along: str, axis: str, lever: str, arm: Floats) -> FunctionTerm:
+    of = {"direction": _letter(along), "axis": _letter(axis), "lever": _letter(lever)}
+    title = say("error along {direction} as a function of {axis}, in proportion to {lever}", **of)
+    middle, half = float(0.5 * (arm.min() + arm.max())), 0.5 * float(np.ptp(arm))
+    factor = f"*({_variable(lever)} - {middle!r})/{half!r}"
+    return FunctionTerm(reading_name(axis), title, along, lever, factor, _variable(axis))
 
 
 def _variable(axis: str) -> str:

@@ -16,10 +16,10 @@ import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, effect_of
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import log_prior
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical import evidence
-from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, FunctionTerm
+from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, FunctionFamily, FunctionTerm
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
@@ -29,7 +29,9 @@ from cmm_uq.base.values import dataclass, replace
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told
-_MOST = 3  # functions together
+_CLEAR = ODDS / (1 + ODDS)
+MOST = 3  # functions together
+_SEEN = 1e-6  # rms over the noise, below which an effect shows nothing
 _TOLD, _ALSO = 0.01, 0.05  # probability from which a form, and another term, is told
 _KNOTS, _STRAIGHT = 24, 0.01  # of a broken line for a smooth curve; part of its size that the line may be off
 _PRIOR = 3.0  # what its size may be in another recording, over what was found
@@ -86,7 +88,7 @@ def empirical_model(result: SearchResult) -> EmpiricalModel | None:
     if not data.families or not data.degrees:
         return None
     beside, described = data.refined(), list[EmpiricalFunction]()
-    while len(described) < _MOST and beside.total - beside.nothing > np.log(ODDS):
+    while len(described) < MOST and beside.total - beside.nothing > np.log(ODDS):
         found = _described(beside, result)
         if any(one.term == found.term for one in described):  # names of a job's effects differ
             found = replace(found, stated=found.stated.replace('"\nformula', f'_{len(described) + 1}"\nformula', 1))
@@ -123,9 +125,10 @@ def _described(data: evidence.FunctionFit, result: SearchResult) -> EmpiricalFun
     own = [i for i in most_of if data.families[i].formula == best.formula]
     x, y, u = _function(data, chosen)
     form, stated = None, ""
-    if name not in (SMOOTH, ROUGH) and (most >= ODDS / (1 + ODDS) or not len(x)):
+    if name not in (SMOOTH, ROUGH) and (most >= _CLEAR or not len(x)):
+        most = most * _of_functions(data, result) if most >= _CLEAR else most
         form, stated = _named(data, own, name, most)
-        form = form if most >= ODDS / (1 + ODDS) else None
+        form = form if most >= _CLEAR else None
     elif len(x) and term.along is not None:
         stated = _stated(term, [_broken_line(x, y)], [float(np.abs(y).max())])
     also = tuple(other.title for other in order[1:4] if sum(by[other].values()) > _ALSO)
@@ -134,6 +137,30 @@ def _described(data: evidence.FunctionFit, result: SearchResult) -> EmpiricalFun
     return EmpiricalFunction(
         term, probability, told, form, also, amplitude, (x, y, u), _seen(data, result, chosen[0]), stated
     )
+
+
+def _of_functions(data: evidence.FunctionFit, result: SearchResult) -> float:
+    """Probability that it is a function and no known effect."""
+    prior, every = log_prior(result.first.explanations) - np.log(SHARES[UNKNOWN]), enumerate(result.first.explanations)
+    others = (i for i, e in every if e.kind == EFFECT and i not in result.chosen)
+    effects = [prior[i] + np.logaddexp(*of_effect(result, i, data)) for i in others]
+    return float(scipy.special.expit(data.total - np.logaddexp.reduce(effects, initial=-np.inf)))
+
+
+def of_effect(result: SearchResult, index: int, data: evidence.FunctionFit) -> tuple[float, float]:
+    """Log evidence of an effect in its own form, and in its other forms, as if it were a function of the fit."""
+    members, scale = result.first.explanations[index].members, result.first.comparison.noise_scale[:, None, None]
+    whole, found = sum(one.weight for one in members), [-np.inf, -np.inf]
+    for rough, width in {(one.rough, one.columns.shape[1]) for one in members}:
+        some = [one for one in members if (one.rough, one.columns.shape[1]) == (rough, width)]
+        columns = np.stack([one.columns for one in some], axis=1) / scale
+        # one that is found shows, at its largest, by as much as the noise
+        rms = np.sqrt(np.sum(data.rest(columns) ** 2, axis=(0, 2)) / data.degrees) / data.least
+        columns = columns / np.where((rms > _SEEN) & (rms < 1), rms, 1.0)[:, None]
+        family = FunctionFamily(data.families[0].term, "", columns, 0.0, np.zeros(0), np.zeros((0, *columns.shape[1:])))
+        log = data.of_family(family)[0] + np.log([one.weight / whole for one in some])[:, None]
+        found[rough] = float(np.logaddexp(found[rough], scipy.special.logsumexp(log)))
+    return found[0], found[1]
 
 
 def _seen(data: evidence.FunctionFit, result: SearchResult, family: int) -> tuple[Floats, Floats, Floats]:
