@@ -20,14 +20,12 @@ from cmm_uq.jobs.importing.cells.figures import SMALL, figure
 from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import without_unit
-from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like, said_by, words_above
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, at_places, columns_in, like, said_by, words_above
 
 _MOST = 0.8  # of figures: where fewer are there, they may be of something else
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 _SAME = 2.0  # between what is nominal and what is measured; or a part of 0.002
 _EXACT = ("nominal", "reference", "target")
-_OF_LENGTHS = ("reference", "measured")
-_FINER = 50  # times, that lengths are printed finer than the places where they were measured
 _SCATTER = 1e-3  # of how far a place is away
 _WIDE = 4.0  # of deviations and tolerances, in the unit of the file
 _PROBED = 8  # places on a circle
@@ -132,12 +130,10 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
         what = "its points lie round a centre, from which a column has their distances, as in circular tests"
         raise NotReadError(what, where=grid.at(rows[0]), fix=OF_CIRCLES)
     reading = SheetReading("points", unit=next((c.unit for c in every if c.unit), None), checked=checked)
+    others = ((c.role, c.step) for c in lengths if c not in every)
+    reading.planned = at_places(others, min(c.step for c in every))
     alone = not checked and sum(own.wide for own in named) == 1
-    reading.beside_lengths = alone and bool(_COUNTED.sub("", triples[0].head).strip())
-    coarse = min(c.step for c in every)  # places as they were planned, at which lengths were measured
-    reading.beside_lengths |= any(
-        c.role in _OF_LENGTHS and c.step * _FINER <= coarse for c in lengths if c not in every
-    )
+    reading.beside_lengths = reading.planned or (alone and bool(_COUNTED.sub("", triples[0].head).strip()))
     reading.bare = [] if named else [c.i + 1 for c in every]
     reading.others = [*grid.ends]
     reading.taken = {f"{letter}_mm": [own.columns[k] for own in triples] for k, letter in enumerate("xyz")}

@@ -25,7 +25,7 @@ from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import Fact, Format, ImportKeys, NotReadError, Recognition, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, axis_runs, placed, placed_runs
-from cmm_uq.jobs.importing.roles import said
+from cmm_uq.jobs.importing.roles import at_places, said
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
 
@@ -134,16 +134,12 @@ def _imported(
 
 
 def _lengths_at_places(sheet: Sheet, header: Header) -> bool:
-    """Whether calibrated and measured lengths stand beside coordinates, and are printed a hundred times finer than those."""
+    """Whether calibrated and measured lengths stand beside coordinates, as far finer figures."""
     row = sheet.rows[header.first] if header.first < len(sheet.rows) else ()
-    digits = [
-        len(re.split("[.,]", heads.text_of(cell))[-1]) if re.search(r"\d[.,]\d", heads.text_of(cell)) else 0
-        for cell in row
-    ]
-    places = [digits[own[0]] for name, own in header.columns.items() if name in COORDINATES and own[0] < len(row)]
-    fine = [i for i in range(min(len(row), len(header.headings))) if places and digits[i] >= max(places) + 2]
-    roles = {said(header.headings[i]) or hint(header.headings[i], lengths=True) for i in fine}
-    return not roles.isdisjoint({"reference", "nominal"}) and not roles.isdisjoint({"measured", "run"})
+    steps = [10.0 ** -len((re.findall(r"(?<=\d)[.,](\d+)", text) or [""])[-1]) for text in map(heads.text_of, row)]
+    places = [steps[own[0]] for name, own in header.columns.items() if name in COORDINATES and own[0] < len(row)]
+    roles = [said(text) or hint(text, lengths=True) for text in header.headings[: len(row)]]
+    return bool(places) and at_places(zip(roles, steps, strict=False), min(places))
 
 
 def _understood(

@@ -6,7 +6,7 @@ A deviation is measured minus reference to the printed digit, a mean the mean of
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from typing import Literal
 
@@ -33,6 +33,7 @@ _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
 _FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
 _NUMBERED = 0.05  # lines may be 1.1 and 1.2, and are no finer figures
 _INFLECTED = 7  # letters of a word of which the last may be another
+_FINER = 50  # times, that lengths are printed finer than the places where they were measured
 _COARSE = 0.05  # mm: figures printed no finer than this are nominal, and exact
 Labels = dict[tuple[str, str], str]  # what stands beside an observation, by sort and words
 
@@ -163,6 +164,7 @@ class SheetReading:
     bare: Sequence[int] = ()  # numbers of columns that no head names
     others: Sequence[int] = ()  # rows that belong to it
     beside_lengths: bool = False  # whether they are places beside something else, as where a length was measured
+    planned: bool = False  # whether lengths beside them say so
     summaries: list[int] = field(default_factory=list)  # rows of another table, of means of this one
     beside: list[Labels] = field(default_factory=list)  # of each row
     further: dict[str, Floats] = field(default_factory=dict)
@@ -219,6 +221,12 @@ class SheetReading:
         self.figures.append(figures)
         for name, values in self.further.items():
             self.covariates.setdefault(name, []).append(float(values[k]))
+
+
+def at_places(columns: Iterable[tuple[str | None, float]], coarse: float) -> bool:
+    """Whether calibrated and measured lengths, columns by role and step, are far finer than the places beside them."""
+    roles = {role for role, step in columns if step * _FINER <= coarse}
+    return not roles.isdisjoint({"reference", "nominal"}) and not roles.isdisjoint({"measured", "run"})
 
 
 def names_length(path: Sequence[str]) -> bool:

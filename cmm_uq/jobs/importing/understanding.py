@@ -237,8 +237,8 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
                 if 2 * len({*reading.rows, *reading.others}) > len(own) and not reading.beside_lengths:
                     break
         if readings:
-            confirmed = [one for one in readings if one.kind == "lengths" and one.called and one.checked]
-            readings = [one for one in readings if not (one.beside_lengths and confirmed)]
+            called = [one.checked for one in readings if one.kind == "lengths" and one.called]
+            readings = [o for o in readings if not (o.beside_lengths and (any(called) or (o.planned and called)))]
             reading = max(readings, key=lambda one: len({*one.rows, *one.others}))
             reading.lines = [sheet.lines[row] for row in reading.rows]
             found.append((reading, grid))

@@ -96,6 +96,23 @@ def test_planned_places_with_directions_beside_lengths_are_no_points() -> None:
     assert "nx" not in found.columns  # directions of lines are no normals
 
 
+@pytest.mark.parametrize("head", ["kalibriert;gemessen", "Sollwert;Istwert", "certified;measured"])
+def test_numbered_bars_at_planned_places_are_lengths_whose_lines_are_asked_for(head: str) -> None:
+    """No deviation confirms which were measured; places to 0.1 mm beside lengths to 0.1 µm are no readings."""
+    ways = ("1;0;0", "0;1;0", "0;0;1") * 2
+    rows = [f"{k};{100 + 31.3 * k:.1f};{200 - 7.2 * k:.1f};{-300 + 11.1 * k:.1f};{way};499.9876;499.98{k}3"
+            for k, way in enumerate(ways, 1)]  # fmt: skip
+    text = "\n".join([f"Kugelstab;X;Y;Z;i;j;k;{head}", *rows, ""]).replace(".", ",")
+    with pytest.raises(NotReadError, match="which lengths lie on one line"):
+        points(text)
+    with pytest.raises(UnplacedError) as error:
+        imported(text.encode(), "x.csv", ImportKeys(columns={"line": "Kugelstab"}))
+    found = error.value.lengths[0]
+    assert found.names == ["1", "2", "3", "4", "5", "6"]
+    np.testing.assert_allclose(found.measured, [499.9813 + k / 1000 for k in range(6)])
+    np.testing.assert_allclose(np.array(found.reference, dtype=float), 499.9876)
+
+
 def test_what_stands_above_each_of_several_tables_is_no_point() -> None:
     tables = [
         f"titre;Plaque {plan} (mm)\nbilles;4;4\nposition;{z};140.0;120.0\nid;nom_x;nom_y;nom_z;dev_x;dev_y;dev_z\n"
