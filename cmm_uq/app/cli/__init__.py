@@ -12,10 +12,9 @@ import gc
 import os
 import sys
 import warnings
-from collections.abc import Callable
-from functools import partial
-from importlib import import_module
-from types import ModuleType
+
+from cmm_uq.base.output.interruption import done, watch, written
+from cmm_uq.base.unused import lighten
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""
@@ -27,7 +26,6 @@ NEW_OBJECTS = 1_000_000
 def main() -> None:
     """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
     from cmm_uq.app.cli.terminal import NO_OUTPUT, any_character, closed, tell
-    from cmm_uq.base.output.interruption import done, watch
 
     watch()
     for variable in THREADS:
@@ -50,38 +48,10 @@ def main() -> None:
     sys.exit(code)
 
 
-UNUSED: tuple[str, ...] = ("emcee.backends.hdf", "emcee.moves.kde", "mpl_toolkits.mplot3d", "numpy.f2py.f2py2e")
-UNUSED += ("scipy.linalg._decomp_interpolative", "scipy.optimize._linprog", "scipy.optimize._shgo")
-UNUSED += ("matplotlib.dviread", "matplotlib.projections.geo", "matplotlib.projections.polar", "matplotlib.tri")
-"""Modules that libraries import and nothing here comes to: with what they import themselves, a tenth of a report's time."""
-
-
-def lighten() -> None:
-    """Load what is not used only when something of it is called, in the command's own process alone."""
-    for name in UNUSED:
-        stand_in = ModuleType(name)
-        stand_in.__dict__["__getattr__"] = partial(_called_later, stand_in)
-        sys.modules.setdefault(name, stand_in)
-
-
-def _called_later(stand_in: ModuleType, name: str) -> Callable[..., object]:
-    if name.startswith("__"):  # what a module says of itself
-        raise AttributeError(name)
-
-    def called(*arguments: object, **named: object) -> object:
-        if sys.modules.get(stand_in.__name__) is stand_in:
-            del sys.modules[stand_in.__name__]
-        return getattr(import_module(stand_in.__name__), name)(*arguments, **named)
-
-    called.__dict__["name"] = name  # by which Matplotlib registers a projection
-    return called
-
-
 def run_command() -> int:
     """Exit code of the subcommand; what stops it is told on standard error."""
     from cmm_uq.app.cli.terminal import BAD_INPUT, NO_OUTPUT, tell
     from cmm_uq.base.errors import CmmUqError, OutputError
-    from cmm_uq.base.output.interruption import written
     from cmm_uq.base.plugins import told_with_package
 
     code = NO_OUTPUT

@@ -17,7 +17,6 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.planning.setting import Setting
-from cmm_uq.app.cli import lighten
 from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.files import REPORTS, Form, Stage, Written, silent
@@ -30,6 +29,7 @@ from cmm_uq.base.output import interruption
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import BrokenPluginError, naming_package
 from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.unused import lighten
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.certificate.proof.sections import DiagnosisProof
 from cmm_uq.certificate.result import JobDiagnosis, Outcome, OwnAnalysis

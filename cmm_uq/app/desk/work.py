@@ -22,7 +22,6 @@ import numpy as np
 import tomlkit
 
 from cmm_uq.analysis.diagnosis.location import residual_field
-from cmm_uq.app.cli import lighten
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.jobs.new import check_empty, job_id, put_new
@@ -35,6 +34,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import JOB_BYTES, content_of, value_of
 from cmm_uq.base.output import Owner
 from cmm_uq.base.output.interruption import done, watch
+from cmm_uq.base.unused import lighten
 from cmm_uq.certificate.plots.machine import machine_plot
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.certificate.verify.given import CHECKS

@@ -351,7 +351,8 @@ class CutSheet:
                 break
             apart = not head and (len(filled) < 2 or not over) and filled != over
             # the last of them stands over all that follow
-            first = head and 0 in numbers and not self.text(head[0], 0) and unit_of(texts[:1])  # named there alone
+            below = self.text(head[0], 0) if head and 0 in numbers else "."
+            first = unit_named(below.strip("()[]")) or (not below and unit_of(texts[:1]))  # named there alone
             grouped = filled == [*range(len(filled))] and (first or len(filled) > 2)
             ahead = head and ((2 * filled[-1] < numbers[-1] and not grouped) or texts[0].endswith(":") or filled == [0])
             if apart or ahead or any(f is not None and f[1] < 1 for f in self.figures[row]):

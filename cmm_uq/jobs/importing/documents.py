@@ -61,9 +61,8 @@ class Qif(Format):
             beside += [own] * (len(rows) - len(beside))
         if not rows:
             problem = f"holds no measured sphere, point or circle, and {others} other features"
-            raise CmmUqError(
-                problem, where=where, fix="Export the results with the measured features and their locations"
-            )
+            fix = "Export the results with the measured features and their locations"
+            raise CmmUqError(problem, where=where, fix=fix)
         facts = facts_of(Fact("version", say("Version of QIF"), Verbatim(root.get("versionQIF", ""))),
                          "features_not_used", say("Features that are no place"), others)  # fmt: skip
         further = [*dict.fromkeys(name for one in beside for name in one)]
@@ -173,9 +172,8 @@ def _column(quantity: QuantityFigures, where: str) -> tuple[str, list[str]]:
 
 def _sheet(name: str, columns: Sequence[tuple[str, list[str]]], where: str) -> Sheet:
     count = max(len(values) for _, values in columns)
-    if (
-        odd := next((heading for heading, values in columns if len(values) not in (1, count)), "")
-    ) or count > ROWS.most:
+    odd = next((heading for heading, values in columns if len(values) not in (1, count)), None)
+    if odd is not None or count > ROWS.most:
         raise CmmUqError(f"the lists of {name!r} differ in length ({odd!r})", where=where,
                          fix="Ask the laboratory for a certificate whose lists belong together")  # fmt: skip
     full = ([heading, *(values if len(values) == count else values * count)] for heading, values in columns)

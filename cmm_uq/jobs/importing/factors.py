@@ -23,14 +23,7 @@ from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 LINE, RUN, POINT = "line", "run", "point"
 _MARKS = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
 # first letters of words for both senses, forward first: in English, German, French and Italian, Spanish
-_PAIRS = (
-    {"F": 1, "B": -1},
-    {"F": 1, "R": -1},
-    {"V": 1, "R": -1},
-    {"H": 1, "R": -1},
-    {"A": 1, "R": -1},
-    {"I": 1, "V": -1},
-)
+_PAIRS = tuple({forward: 1, back: -1} for forward, back in ("FB", "FR", "VR", "HR", "AR", "IV"))
 _TOKEN = re.compile(r"[^\W_]+")
 _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
 _SHORTENED = re.compile(r"[^\W\d_]{3,}(?=\.)")
@@ -115,7 +108,9 @@ def _turns(values: Sequence[str], targets: Sequence[float]) -> list[int] | None:
 
 
 def counted(label: Label, *, lengths: bool) -> str | None:
-    """What a label counts, by the words above it, else by those in it."""
+    """What a label counts, by the words above it, else by those in it; nothing where these are verdicts."""
+    if {" ".join(plain_words(value)) for value in {*label.values}} <= words_of("rows")["summary"]:
+        return None
     if label.sort == "column" and counting(label.values) and hint(label.values[0], lengths=lengths) == RUN:
         return RUN  # below the head of what stands beside, as of directions
     if label.sort == "column" and (of := hint(label.words, lengths=lengths)) and (of != RUN or counting(label.values)):

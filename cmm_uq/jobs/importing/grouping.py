@@ -78,14 +78,14 @@ def _places_of_many(xyz: Floats) -> Ints:
 def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]] | None:
     """Measurement, point and repeat of each of the places (n, 3), mm; ``None`` where nothing says which belong together."""
     place = places(xyz)
-    found = factors.varying(labels, lengths=False)
+    found = _named_by_level(every := factors.varying(labels, lengths=False))
     ways = [*filter(None, (_grouped(of, found, place, xyz) for of in _labels(found)))]
     each = int(place.max()) + 1  # of which a few have two names
     whole = (f for f in found if each <= f[1].max() < _SINGLE * each and fixes(f[1], place))
     ways += (Grouping(_NAMED, None, 0 * place, f[1], f) for f in whole)
     first = xyz[np.unique(place, return_index=True)[1]] if len(xyz) <= _COMPARED else xyz[:0]
     numbered = bool(found) and all(f[1].max() + 1 == len(xyz) for f in found)  # from first to last, as of one artefact
-    plate = on_a_plate(first) or (numbered and on_a_plate(first, oblong=True))
+    plate = on_a_plate(first) or (numbered and on_a_plate(first, oblong=True)) or len(found) < len(every)
     named = any(way.of is None and way.rank and way.at.max() + 1 < len(xyz) for way in ways)  # names that come again
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
@@ -112,6 +112,16 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     if best.rank <= _NAMED and not all(fixes(own, one) and fixes(one, own) for one in alike):
         return None
     return _told(best, found, xyz, labels)
+
+
+def _named_by_level(found: Sequence[Counted]) -> list[Counted]:
+    """Labels where points are counted anew at each level of one artefact, as of a ring: named by both."""
+    level = next((f for f in found if not words_of("rows")["level"].isdisjoint(plain_words(f[0].words))), None)
+    if level is None:
+        return [*found]
+    both = [(f, tuple(map(" ".join, zip(level[0].values, f[0].values, strict=True)))) for f in found if f[2] == POINT]
+    named = [(Label(f[0].words, values, f[0].sort), codes(values), POINT) for f, values in both]
+    return [*named, *(f for f in found if f is not level and f[2] != POINT)]
 
 
 def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
@@ -210,7 +220,7 @@ def _rank(of: Counted, shape: str, *, named: bool, again: Counted | None) -> flo
         return 0.0
     if shape == "moved":
         return (_NAMED if of[0].sort == "part" else _RESTARTED if of[0].sort == "column" else _MOVED) + word
-    called = again is not None and again[2] == POINT and not {*again[0].values} <= factors.LETTERS
+    called = again is not None and again[2] == POINT and not all(map(str.isalpha, again[0].values))
     return _RESTARTED if again and of[2] is None and (of[0].sort != "part" or called) else 0.0
 
 

@@ -71,10 +71,8 @@ def words_of(table: str) -> Mapping[str, frozenset[str]]:
 # Japanese and Korean beside a letter is a word of its own
 _WORDS = re.compile(r"[^\W\d_\u3040-\u9fff\uac00-\ud7a3]+|[\u3040-\u9fff\uac00-\ud7a3]+|\d+")
 # letters that are none with an accent, characters in their simplified form; signs after a number
-_TRADITIONAL, _SIMPLIFIED = (
-    "標稱準測誤實際長線軸點對対參極負數離徑圓値單単復環規階週塊處間終檢",
-    "标称准测误实际长线轴点对对参极负数离径圆值单单复环规阶周块处间终检",
-)
+_TRADITIONAL = "標稱準測誤實際長線軸點對対參極負數離徑圓値單単復環規階週塊處間終檢"
+_SIMPLIFIED = "标称准测误实际长线轴点对对参极负数离径圆值单单复环规阶周块处间终检"
 _SAME = str.maketrans(f"łøđı{_TRADITIONAL}", f"lodi{_SIMPLIFIED}", "ªº°")
 _COLUMNS = {phrase: column for column, phrases in words_of("columns").items() for phrase in phrases}
 _AXIS = words_of("axis")  # words beside the letter of an axis, those that leave it a coordinate among them
@@ -83,7 +81,7 @@ _LONGEST = 120  # characters of a heading; longer text is none
 
 # coverage factor in a heading, as ``U (µm), k = 2``
 COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGNORECASE)
-_AS_WRITTEN = re.compile(r"(?i)[dmyajt]+([-/.])[dmyajt]+\1[dmyajt]+|hh?:mm(:ss)?")  # dates and times, in a row of units
+_AS_WRITTEN = re.compile(r"(?i)[dmyajt]+([-/.])[dmyajt]+\1[dmyajt]+|hh?:mm(:ss)?|°")  # of dates, times and angles
 # what certificates print above a column, beside its unit or its coverage factor
 _SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
 WORD = re.compile(r"[^\W\d_]+")
@@ -279,9 +277,8 @@ def with_units(sheet: Sheet, row: int, headings: Sequence[str], columns: Mapping
     filled = {i: cell for i, cell in enumerate(below) if cell not in ("", "()", "[]", "-")}
     texts = {i: cell.strip("[]()<>{} ") for i, cell in filled.items() if isinstance(cell, str)}
     alone = {i: unit for i, text in texts.items() if (unit := unit_named(text))}
-    whole = bool(alone) and len(filled) == len(
-        {*alone, *(i for i, text in texts.items() if _AS_WRITTEN.fullmatch(text))}
-    )
+    known = {*alone, *(i for i, text in texts.items() if _AS_WRITTEN.fullmatch(text))}
+    whole = bool(alone) and len(known) == len(filled)
     return Header(row, row + 1 + whole, headings, columns, units | alone if whole else units, odd)
 
 

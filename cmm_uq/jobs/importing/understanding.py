@@ -213,7 +213,7 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
     problem: NotReadError | None = None
     for blocks, rows in each(grid):
         usable = [
-            r for r in rows if not is_summary(sheet.rows[r]) and not left_out.is_void(sheet.rows[r], "void", "feature")
+            k for k in rows if not (is_summary(sheet.rows[k]) or left_out.is_void(sheet.rows[k], "void", "feature"))
         ]
         deviations = left_out.below_deviations(grid, usable)  # beside what they are of
         own = _layout(grid, [row for row in usable if row not in deviations]) if usable else []

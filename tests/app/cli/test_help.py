@@ -169,7 +169,7 @@ def test_the_script_can_be_shown_instead() -> None:
 
 COMMAND = """
 import sys
-from cmm_uq.app.cli import lighten
+from cmm_uq.base.unused import lighten
 lighten()
 import emcee
 import numpy as np

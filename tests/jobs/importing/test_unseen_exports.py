@@ -36,7 +36,9 @@ their authors allow, 3 refused and one read wrongly (a ball whose name had its p
 
 Twenty-six of 1 December 2026, in sixteen languages: 15 came out as their authors have it at the first try, 8 were refused or
 asked about needlessly, 3 read wrongly (names of axes and lengths as those of lengths alone, a grid of points of a plane as two
-placements, a head that comes again on the next page as a gap); eight are there (``M``).
+placements, a head that comes again on the next page as a gap); eight are there (``M``). Twenty-four more by another hand on
+that day, after these were mended: 12 came out as their author has it, one was asked about needlessly, 10 refused and one read
+wrongly (letters of two planes as the ends of bars); five are there.
 """
 
 from __future__ import annotations
@@ -124,6 +126,8 @@ PLACED = {
     "M01": [-440, -750, -350],
     "M02": [60, 400, 250],
     "M04": [50, 350, -300],
+    "M11": [40, 800, 200],
+    "M13": [120, 450, 300],
 }
 """Start of the first line, of files that say where their lines lie."""
 GROUPED = {"18": 2}  # points of which the file does not say how many are one measurement, and their distances do

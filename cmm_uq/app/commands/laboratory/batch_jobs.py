@@ -17,12 +17,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from cmm_uq.app.cli import lighten
 from cmm_uq.app.commands.files import RESULTS, called
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output.manifest import new_file, refuse_taken
+from cmm_uq.base.unused import lighten
 from cmm_uq.jobs.verdicts import AGREES, Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.records.facts import Heads

@@ -67,7 +67,11 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     for row in range(len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and first <= row < last and row not in heads:
             own = [grid.figure(row, k) for k in columns]
-            if None not in own and any(f is not None and f[1] < 1 for f in own) and not grid.lettered(row):
+            if (
+                None not in own
+                and any(f is not None and f[1] < 1 for f in own)
+                and not (grid.lettered(row) or grid.place(row))
+            ):
                 return None  # whatever else stands in it, it may be measured
             text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
             if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
@@ -126,9 +130,8 @@ def _of_preamble(grid: CutSheet, row: int, rows: Collection[int], columns: Colle
     if not word or not {*grid.block_of[row].rows}.isdisjoint(rows):
         return False
     names = [(grid.text(r, first), grid.figure(r, first)) for r in rows]
-    numbered = not any(map(str.isdigit, grid.text(row, first))) and all(
-        any(map(str.isdigit, name)) for name, _ in names
-    )
+    digits = [any(map(str.isdigit, name)) for name, _ in names]
+    numbered = not any(map(str.isdigit, grid.text(row, first))) and all(digits)
     return numbered or all(f is not None for _, f in names)
 
 

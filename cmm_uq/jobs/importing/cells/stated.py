@@ -115,11 +115,7 @@ def _lines(form: Format, content: bytes, where: str, keys: FileKeys) -> Iterator
     """Lines at both ends of a file, as text and as cells; tags of a page or a document are what parts them."""
     if content.startswith(b"PK"):
         sheets = form.read(content, where, ImportKeys())
-        rows = [
-            (n, "\t".join(map(text_of, row)))
-            for sheet in sheets
-            for row, n in zip(sheet.rows, sheet.lines, strict=True)
-        ]
+        rows = [(n, "\t".join(map(text_of, row))) for one in sheets for row, n in zip(one.rows, one.lines, strict=True)]
     else:
         rows = [*enumerate(_plain(form.name, decoded(content, where, keys.encoding)[0]).splitlines(), 1)]
     both = rows if len(rows) <= _FIRST + _LAST else [*rows[:_FIRST], *rows[-_LAST:]]
@@ -193,9 +189,8 @@ def _day_of(text: str, every: Sequence[str], label: str) -> dt.date | None:
     parts = found.groupdict()
     day, month = int(found["d"]), _month(found["name"]) if parts.get("name") else int(found["m"])
     if parts.get("sign") in ("/", "-"):
-        pairs = [
-            (int(one["d"]), int(one["m"])) for text in every if (one := _DATES[1].search(text)) and one["sign"] in "/-"
-        ]
+        alike = [one for text in every if (one := _DATES[1].search(text)) and one["sign"] in "/-"]
+        pairs = [(int(one["d"]), int(one["m"])) for one in alike]
         swapped, kept = any(m > 12 for _, m in pairs), any(d > 12 for d, _ in pairs)
         kept |= not re.search(r"\bdate\b", _folded(label)) and not swapped
         if swapped == kept and day != month:

@@ -26,7 +26,7 @@ _FAR = 1.0  # mm by which no measured length differs from its reference, where b
 _LEAST = 2.0  # of a length without a reference, in the unit of the file
 WIDEST = 100  # columns of a table of lengths
 _WITHIN = re.compile(r"(?<![\d.,])\d+[.,]\d+(?![\d.,]*\d)")  # figures in texts
-_AXIS = re.compile(r"(?<![A-Za-z])[XYZ](?![A-Za-z])")
+_AXIS = re.compile(r"(?<![A-Za-zÀ-ɏ])[XYZ](?![A-Za-zÀ-ɏ])")
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
 _NAME = "Name the columns by what they are: nominal_mm, reference_mm, length_mm, deviation_um"

@@ -146,9 +146,8 @@ def _told_apart(
             continue
         if one[0].sort == "part" and line and run is None:
             if {*one[0].values} <= {*"abcdefgh"}:
-                raise NotReadError(
-                    "letters in names may be of runs or lines", where=place, fix="Number runs in a column"
-                )
+                fix = "Number runs in a column"
+                raise NotReadError("letters in names may be of runs or lines", where=place, fix=fix)
             if one[2] is None and not _digits(one[0]) and _crossed(one, line):
                 what = f"{one[0].values[0]!r} in names may count runs, or lines"
                 fix = 'Say so with a word for a run ahead of each number, as in "Run 1"'

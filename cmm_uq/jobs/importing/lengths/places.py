@@ -40,7 +40,7 @@ _NAMED = (
     re.compile(rf"\bX({_PLAIN})[ ,;/]{{1,3}}Y({_PLAIN})[ ,;/]{{1,3}}Z({_PLAIN})(?!\w)"),
 )
 _ALL_AXES = re.compile(r"(?:X\W{0,3}Y\W{0,3}Z|\bI\W{1,3}J\W{1,3}K)\W{0,3}(?:\([^)\d]*\))?\W{0,5}$", re.I)
-_AXIS = re.compile(r"(?<![A-Za-z])([+-]?)([XYZ]+)(?![A-Za-z\d]|\s*[=:]?\s*[+-]?\d)")
+_AXIS = re.compile(r"(?<![A-Za-zÀ-ɏ])([+-]?)([XYZ]+)(?![A-Za-zÀ-ɏ\d]|\s*[=:]?\s*[+-]?\d)")
 _ARROW = re.compile(r"(?:→|->|=>|~|–|—|\.\.)\s*$")
 _FAR, _FAR_UNSAID = 3.0, 1.5  # of the longest length: farther are no ends of it, said to be so or not
 _ROUNDED = 0.002  # of a length, which its place may be shorter by
@@ -98,7 +98,8 @@ def role_among(text: str) -> str:
     """What a head says of the figures below it; of two letters its first word."""
     words = plain_words(text)
     own = [word for k, word in enumerate(words) if len(word) > 2 or not word.isascii() or (k == 0 and len(word) > 1)]
-    return next(filter(None, map(_role, own)), "") or next(filter(None, map(_begun, own)), "")
+    roles = [*filter(None, map(_role, own))] or [*filter(None, map(_begun, own))]
+    return DIRECTION if {*roles} == {END, DIRECTION} else next(iter(roles), "")  # as towards the end
 
 
 def _begun(word: str) -> str:

@@ -317,6 +317,10 @@ class Client:
         (answer,) = self.call("GetProp(Tool.Name())")
         return str(_first(answer, "Tool.Name"))
 
+    def find_tool(self, name: str) -> None:
+        """Look for a tool; error 1502 where there is none of this name."""
+        self.call(f"FindTool({_quoted(name)})")
+
     def part_temperature(self) -> float | None:
         """Temperature of the part, °C, as section 9.6 of 1.4.3 announces it; ``None`` where the server has none."""
         celsius = self._known("GetProp(Part.Temperature())", "Part.Temperature")
