@@ -158,15 +158,8 @@ def positioning(
     remarks += [as_angle(worst, test.facts.angle_arcsec)] if test.facts.angle_arcsec is not None else []
     machine = test.artefact.points.machine
     remarks += _not_measured(runs, machine, angular=angular) if of is axes else []
-    items_of = (
-        say("rotary axes")
-        if angular
-        else say("circles")
-        if of is circles
-        else say("diagonals")
-        if of is diagonals
-        else say("axes")
-    )
+    each = say("rotary axes"), say("circles"), say("diagonals"), say("axes")
+    items_of = each[0 if angular else 1 if of is circles else 2 if of is diagonals else 3]
     return test.stated(_TITLES[figure], items_of, tuple(items), remarks, signed=False)
 
 
@@ -263,13 +256,11 @@ def conditions(
     few += list(_short_of_travel(runs, artefact)) if of is axes else []
     for number, run in runs.items():
         if not _enough(run):
+            told = {"number": number, "repeats": run.repeats, "targets": len(run.targets), "bare": 100 * _bare(run)}
             few.append(
                 say(
                     "measurement {number}: {repeats} runs, {targets} targets, {bare:.0f} % of the run without one",
-                    number=number,
-                    repeats=run.repeats,
-                    targets=len(run.targets),
-                    bare=100 * _bare(run),
+                    **told,
                 )
             )
         read = recorded and np.ptp(run.x) > 0  # and not planned beside a recording
@@ -278,14 +269,8 @@ def conditions(
         alike = np.all(run.x[..., :, None] == run.x[..., None, :], axis=(0, 1)) & ~np.eye(run.repeats, dtype=bool)
         if read and alike.any():
             first, second = (np.argwhere(alike)[0] + 1).tolist()
-            few.append(
-                say(
-                    "measurement {number}: repeat {second} is repeat {first} to the last digit",
-                    number=number,
-                    first=first,
-                    second=second,
-                )
-            )
+            told = {"number": number, "first": first, "second": second}
+            few.append(say("measurement {number}: repeat {second} is repeat {first} to the last digit", **told))
     what = _TURNS if of is axes and artefact.angular else what
     return (Condition(what, tuple(few) if runs else (what,)),)
 

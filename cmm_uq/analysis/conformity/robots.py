@@ -172,15 +172,8 @@ def pose_error(test: Test, *, figure: str, title: Text, what: str, lines: tuple[
 def copies_in_words(points: Points, copies: Mapping[int, int]) -> Text:
     """Which readings are copies of which, that are of no copied cycle; empty when none is."""
     rows = [row for row in sorted(copies) if own_rule.counting(points)[row]]
-    each = [
-        say(
-            "pose {pose}, cycle {later} of cycle {first}",
-            pose=int(points.point[row]),
-            later=int(points.repeat[row]),
-            first=int(points.repeat[copies[row]]),
-        )
-        for row in rows
-    ]
+    numbers = ((int(points.point[row]), *(int(points.repeat[i]) for i in (row, copies[row]))) for row in rows)
+    each = [say("pose {pose}, cycle {later} of cycle {first}", pose=p, later=i, first=j) for p, i, j in numbers]
     if not each:
         return NOTHING
     named, more = semicolons(each[:_NAMED]), len(each) - _NAMED

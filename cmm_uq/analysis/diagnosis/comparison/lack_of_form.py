@@ -60,7 +60,7 @@ def _of_forms(comparison: CandidateComparison, families: Iterable[FunctionFamily
     """Log evidence (k, b) of functions, by kind of noise, for data (m, b), the size of few coefficients at its likeliest."""
     degrees, found = comparison.degrees_of_freedom, np.full((len(comparison.kinds), data.shape[1]), -np.inf)
     totals = [np.einsum("mb,mb->b", data, noise(data)) for noise in comparison.precisions]
-    for columns, log_prior in _blocks(families):
+    for columns, log_prior in map(joined, alike(families)):
         for k, (noise, square, total) in enumerate(zip(comparison.precisions, comparison.squares, totals, strict=True)):
             weighed, strengths, seen = _along_axes(noise, columns, _SHOWS**2 * float(square))
             if strengths.shape[1] <= _FITTED:
@@ -78,18 +78,19 @@ def _of_forms(comparison: CandidateComparison, families: Iterable[FunctionFamily
     return found
 
 
-def _blocks(families: Iterable[FunctionFamily]) -> Iterator[tuple[Floats, Floats]]:
-    """Functions (m, K, r) of as many coefficients, and the log prior of each (K,), so many at once as a block may hold."""
+def alike(families: Iterable[FunctionFamily]) -> Iterator[list[FunctionFamily]]:
+    """Families of as many coefficients, so many at once as a block may hold."""
     waiting: dict[int, list[FunctionFamily]] = {}
     for family in families:
         some = waiting.setdefault(family.columns.shape[2], [])
         some.append(family)
         if sum(each.columns.size for each in some) > _NUMBERS:
-            yield _joined(waiting.pop(family.columns.shape[2]))
-    yield from map(_joined, waiting.values())
+            yield waiting.pop(family.columns.shape[2])
+    yield from waiting.values()
 
 
-def _joined(some: Sequence[FunctionFamily]) -> tuple[Floats, Floats]:
+def joined(some: Sequence[FunctionFamily]) -> tuple[Floats, Floats]:
+    """All functions (m, K, r) of families of as many coefficients, and the log prior of each (K,)."""
     log_prior = np.repeat([each.log_prior for each in some], [each.columns.shape[1] for each in some])
     return np.concatenate([each.columns for each in some], axis=1), log_prior
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import scipy
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.diagnosis.comparison.algebra import SigmaIntegral, eigen
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES
-from cmm_uq.analysis.diagnosis.comparison.lack_of_form import likeliest_noise
+from cmm_uq.analysis.diagnosis.comparison.lack_of_form import alike, joined, likeliest_noise
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily
 from cmm_uq.analysis.diagnosis.held_out import FOLDS, Improvement, held_out_groups
@@ -25,6 +26,7 @@ _FOLLOWED, IMPROBABLE = 40, 1e-3  # versions that a prediction averages, and wha
 # Part of the largest log evidence over nothing from which on a form may come first between its nodes, and how many of these
 _WORTH_DIVIDING, _NODES = 0.5, 6
 _SINGULAR = 1e-9  # part of the largest singular value below which another counts as zero
+_OPEN = 1e-10  # part of what an observation tells by itself, up to which others leave it open
 
 
 @dataclass(frozen=True)
@@ -65,78 +67,119 @@ class FunctionFit:
 
     def with_function(self, version: FunctionVersion) -> FunctionFit:
         """The same with one function more, as noise of its size."""
-        return self.with_columns(version.amplitude * self.families[version.family].columns[:, version.index])
+        return self.with_noise(version.amplitude * self.families[version.family].columns[:, version.index])
 
-    def with_columns(self, columns: Floats) -> FunctionFit:
-        return replace(self, covariance=self.covariance + columns @ columns.T)
+    def with_noise(self, columns: Floats) -> FunctionFit:
+        """The same with columns (m, r) more, as noise of their size (Woodbury's identity)."""
+        weighed = self.precision @ columns
+        factor = np.linalg.cholesky(np.eye(columns.shape[1]) + columns.T @ weighed)
+        covariance = self.covariance + columns @ columns.T
+        return self._less(np.linalg.solve(factor, weighed.T), self.degrees, covariance)
 
-    def at(self, rows: NDArray[np.bool_] | Ints) -> FunctionFit:
-        every = [replace(family, columns=family.columns[rows]) for family in self.families]
-        covariance = self.covariance[np.ix_(rows, rows)]
-        return replace(self, y=self.y[rows], free=self.free[rows], covariance=covariance, families=every)
+    def without(self, out: NDArray[np.bool_]) -> FunctionFit:
+        """The same of the observations but some (m,): as if columns E, one at each of these, were free besides.
+
+        The precision P is then P − P·E·(Eᵀ·P·E)⁺·Eᵀ·P, without the directions of E that the others leave open.
+        """
+        values, vectors = np.linalg.eigh(self.precision[np.ix_(out, out)])
+        told = values > _OPEN / np.diag(self.covariance)[out].min()
+        rows = (vectors[:, told] / np.sqrt(values[told])).T @ self.precision[out]
+        return self._less(rows, self.degrees - int(told.sum()), self.covariance)
+
+    def _less(self, rows: Floats, degrees: int, covariance: Floats) -> FunctionFit:
+        """The same where of the precision rowsᵀ·rows is taken, of rows (q, m), and so many degrees of freedom are left."""
+        seen, y = [np.tensordot(rows, columns, 1) for _, columns, _ in self._alike], rows @ self.y
+        gone = self._of_each((_squares(z, z), np.tensordot(y, z, 1)) for z in seen)
+        products = [(own - z, of_y - zy) for (own, of_y), (z, zy) in zip(self.products, gone, strict=True)]
+        found, precise = replace(self, covariance=covariance), (self.precision - rows.T @ rows, degrees)
+        found.__dict__.update(_alike=self._alike, products=products, _precise=precise)
+        return found
 
     @cached_property
     def root(self) -> Floats:
         return np.asarray(np.linalg.cholesky(self.covariance))
 
-    def white(self, columns: Floats) -> Floats:
-        """Columns (m, …) whose noise is white."""
-        flat = columns.reshape(len(columns), -1)
-        white = scipy.linalg.solve_triangular(self.root, flat, lower=True, check_finite=False)
-        return np.asarray(white).reshape(columns.shape)
-
     @cached_property
-    def told(self) -> tuple[Floats, Floats, Floats]:
-        """Basis (m, q) that the free columns reach, coefficients (p, q) of it, and (p, p − q) of what stays open."""
-        white = self.white(self.free)
-        length = np.linalg.norm(white, axis=0)
-        length[length == 0] = 1.0
-        U, s, Vt = np.linalg.svd(white / length, full_matrices=len(white) < white.shape[1])
-        rank = int(np.sum(s > _SINGULAR * s.max(initial=0.0)))
-        return U[:, :rank], (Vt[:rank].T / s[:rank]) / length[:, None], Vt[rank:].T / length[:, None]
+    def _precise(self) -> tuple[Floats, int]:
+        """Inverse (m, m) of the covariance, but zero along the free columns, and its rank."""
+        every = np.eye(len(self.y)), self.free
+        white, free = (scipy.linalg.solve_triangular(self.root, each, lower=True) for each in every)
+        length = np.linalg.norm(free, axis=0)
+        U, s, _ = np.linalg.svd(free / np.where(length > 0, length, 1.0), full_matrices=False)
+        basis = U[:, s > _SINGULAR * s.max(initial=0.0)]
+        white = white - basis @ (basis.T @ white)
+        return np.asarray(white.T @ white), len(white) - basis.shape[1]
+
+    @property
+    def precision(self) -> Floats:
+        return self._precise[0]
+
+    @property
+    def degrees(self) -> int:
+        return self._precise[1]
 
     def rest(self, columns: Floats) -> Floats:
-        """What the free columns leave of others (m, …), whitened."""
-        white, basis = self.white(columns), self.told[0]
-        flat = white.reshape(len(white), -1)
-        return np.asarray(flat - basis @ (basis.T @ flat)).reshape(white.shape)
+        """What the free columns leave of others (m, r), whitened."""
+        return np.asarray(self.root.T @ (self.precision @ columns))
 
     @cached_property
-    def degrees(self) -> int:
-        return int(len(self.y) - self.told[0].shape[1])
-
-    @cached_property
-    def left(self) -> Floats:
-        return self.rest(self.y)
+    def square(self) -> float:
+        """Sum of squares of what is left of the observations, whitened."""
+        return float(self.y @ self.precision @ self.y)
 
     @cached_property
     def integral(self) -> SigmaIntegral:
-        return SigmaIntegral(self.sigma, self.log_sigma, self.degrees, float(self.left @ self.left))
+        return SigmaIntegral(self.sigma, self.log_sigma, self.degrees, self.square)
 
     @cached_property
     def nothing(self) -> float:
         """Log evidence of no function."""
-        return float(self.integral(np.array([self.left @ self.left]))[0])
+        return float(self.integral(np.array([self.square]))[0])
+
+    @cached_property
+    def products(self) -> list[tuple[Floats, Floats]]:
+        """Of each family the products (K, r, r) of a function's columns with each other, and (K, r) with the observations."""
+        return [self.products_of(family) for family in self.families]
+
+    def products_of(self, family: FunctionFamily) -> tuple[Floats, Floats]:
+        weighed = np.tensordot(self.precision, family.columns, 1)
+        return _squares(family.columns, weighed), np.tensordot(self.y, weighed, 1)
+
+    @cached_property
+    def _alike(self) -> list[tuple[list[FunctionFamily], Floats, Floats]]:
+        """Families of as many coefficients, all their functions (m, K, r) and log priors (K,)."""
+        return [(some, *joined(some)) for some in alike(self.families)]
+
+    def _of_each(self, found: Iterable[tuple[Floats, Floats]]) -> list[tuple[Floats, Floats]]:
+        """Of each family what was found of all that are alike."""
+        of = dict[FunctionFamily, tuple[Floats, Floats]]()
+        for (some, *_), (one, other) in zip(self._alike, found, strict=True):
+            ends = np.cumsum([0, *(family.columns.shape[1] for family in some)]).tolist()
+            of.update((family, (one[i:j], other[i:j])) for family, (i, j) in zip(some, pairwise(ends), strict=True))
+        return [of[family] for family in self.families]
 
     @cached_property
     def evidence(self) -> list[tuple[Floats, Floats]]:
         """Of each family the log of evidence and prior of its functions at every size, and these sizes, each (K, a)."""
-        return [self.of_family(family) for family in self.families]
+        of = dict(zip(self.families, self.products, strict=True))
+        known = ([np.concatenate([of[one][k] for one in some]) for k in (0, 1)] for some, *_ in self._alike)
+        return self._of_each(self._of_products(log_prior, *next(known)) for *_, log_prior in self._alike)
 
     def of_family(self, family: FunctionFamily) -> tuple[Floats, Floats]:
-        z = self.rest(family.columns)
-        products = np.einsum("mkr,mks->krs", z, z) if z.shape[2] < 3 else z.transpose(1, 2, 0) @ z.transpose(1, 0, 2)
-        strengths, turn = eigen(products) if z.shape[2] > 1 else (products[:, 0], np.ones_like(products))
+        return self._of_products(family.log_prior, *self.products_of(family))
+
+    def _of_products(self, log_prior: Floats | float, products: Floats, seen: Floats) -> tuple[Floats, Floats]:
+        strengths, turn = eigen(products)
         strengths = np.maximum(strengths, 0.0)
-        along = np.einsum("krs,kr->ks", turn, np.tensordot(self.left, z, 1)) ** 2
+        along = np.einsum("krs,kr->ks", turn, seen) ** 2
         rms, largest = np.sqrt(strengths.sum(axis=1) / max(self.degrees, 1)), 1 / self.least
         smallest = np.minimum(_SMALLEST / np.maximum(rms, _SMALLEST / largest), largest)
         sizes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
         ratio = sizes[:, :, None] ** 2 * strengths[:, None]
         explained = np.sum(sizes[:, :, None] ** 2 / (1 + ratio) * along[:, None], axis=2)
-        log = self.integral(float(self.left @ self.left) - explained) - 0.5 * np.log1p(ratio).sum(axis=2)
+        log = self.integral(self.square - explained) - 0.5 * np.log1p(ratio).sum(axis=2)
         log[rms * largest < _SMALLEST] = -np.inf  # even the largest would not show
-        return log + family.log_prior - np.log(AMPLITUDES), sizes
+        return log + np.reshape(log_prior, (-1, 1)) - np.log(AMPLITUDES), sizes
 
     def refined(self) -> FunctionFit:
         """The same with finer nodes about those that carry a form that may be the most probable.
@@ -144,27 +187,25 @@ class FunctionFit:
         Between two nodes of its grid a form of large size loses more of its evidence than others are behind it.
         """
         best = max(float(log.max(initial=-np.inf)) for log, _ in self.evidence)
-        families, known = list[FunctionFamily](), list[tuple[Floats, Floats]]()
-        for family, (log, sizes) in zip(self.families, self.evidence, strict=True):
+        every = list[tuple[FunctionFamily, tuple[Floats, Floats]]]()
+        for family, (log, _), known in zip(self.families, self.evidence, self.products, strict=True):
             of_node, most = log.max(axis=1), float(log.max(initial=-np.inf))
             likely = np.argsort(-of_node, kind="stable")[:_NODES]
             likely = likely[of_node[likely] > most + np.log(IMPROBABLE)]
             finer = family.finer(likely) if most - self.nothing > _WORTH_DIVIDING * (best - self.nothing) else None
             if finer is not None:
-                families.append(finer)
-                known.append(self.of_family(finer))
+                every.append((finer, self.products_of(finer)))
                 family = family.without(likely)
-                log, sizes = (np.delete(each, likely, axis=0) for each in (log, sizes))
-            if len(log):
-                families.append(family)
-                known.append((log, sizes))
-        found = replace(self, families=families)
-        found.__dict__["evidence"] = known
+                known = (np.delete(known[0], likely, axis=0), np.delete(known[1], likely, axis=0))
+            if len(known[0]):
+                every.append((family, known))
+        found = replace(self, families=[family for family, _ in every])
+        found.__dict__["products"] = [known for _, known in every]
         return found
 
     @cached_property
     def total(self) -> float:
-        return float(scipy.special.logsumexp([scipy.special.logsumexp(log) for log, _ in self.evidence]))
+        return float(scipy.special.logsumexp(np.concatenate([log.ravel() for log, _ in self.evidence])))
 
     def versions(self, most: int = _FOLLOWED) -> list[FunctionVersion]:
         """The most probable, with their probability among all functions; of a finer grid the best in each node's place."""
@@ -182,12 +223,19 @@ class FunctionFit:
 
     def fitted(self, version: FunctionVersion) -> tuple[Floats, Floats, float]:
         """Coefficients (r,) of a function, their covariance (r, r), mm, and σ: conditional on its size, σ at its mean."""
-        z = self.rest(self.families[version.family].columns[:, version.index])
-        inverse = np.linalg.inv(z.T @ z + np.eye(z.shape[1]) / version.amplitude**2)
-        mean = inverse @ (z.T @ self.left)
-        square = float(self.left @ self.left - mean @ (z.T @ self.left))
+        products, along = (each[version.index] for each in self.products[version.family])
+        inverse = np.linalg.inv(products + np.eye(len(products)) / version.amplitude**2)
+        mean = inverse @ along
+        square = self.square - float(mean @ along)
         sigma = max(float(np.sqrt(max(square, 0.0) / max(self.degrees, 1))), self.least)
         return mean, np.asarray(inverse * sigma**2), sigma
+
+
+def _squares(columns: Floats, weighed: Floats) -> Floats:
+    """Products (K, r, r) of columns (m, K, r) with others."""
+    if columns.shape[2] < 3:
+        return np.asarray(np.einsum("mkr,mks->krs", columns, weighed))
+    return np.asarray(columns.transpose(1, 2, 0) @ weighed.transpose(1, 0, 2))
 
 
 def _by_cell(log: Floats, cell: Ints | None) -> tuple[Floats, Ints]:
@@ -210,49 +258,42 @@ class HeldOutErrors:
 def predictions(whole: FunctionFit, out: NDArray[np.bool_], functions: int) -> tuple[list[HeldOutErrors], int]:
     """Predict the observations ``out`` (m,) from the others without a function, with one, two …; dimensions that are open."""
     order, seen = np.concatenate([np.flatnonzero(~out), np.flatnonzero(out)]), int(np.sum(~out))
-    fold, ordered, found = whole.at(~out), replace(whole, families=()).at(order), list[HeldOutErrors]()
-    root_of_noise = ordered.root[seen:, seen:]
-    lost = 0
+    root = np.linalg.cholesky(whole.covariance[np.ix_(order, order)])[
+        seen:, seen:
+    ]  # of noise that the others do not tell
+    fold, given, found, lost = whole.without(out), replace(whole, families=()), list[HeldOutErrors](), 0
     for number in range(functions + 1):
-        basis, among, loose = fold.told
         versions = [v for v in fold.versions() if v.probability > IMPROBABLE] if number else []
-        columns = [whole.families[v.family].columns[order, v.index] for v in versions]
-        white = ordered.white(np.hstack([ordered.y[:, None], ordered.free, *columns]))
-        p = 1 + ordered.free.shape[1]
-        reach = white[seen:, 1:p] @ among
-        ends = np.cumsum([0, *(each.shape[1] for each in columns)])
-        beyond = np.delete(white, slice(1, p), axis=1)
-        beyond = beyond[seen:] - reach @ (basis.T @ beyond[:seen])
-        U, s, _ = np.linalg.svd(white[seen:, 1:p] @ loose, full_matrices=False)
-        U = U[:, s > _SINGULAR * max(float(s.max(initial=0.0)), 1e-300)] if s.size else U[:, :0]
-        beyond, reach, lost = (beyond - U @ (U.T @ beyond), reach - U @ (U.T @ reach), U.shape[1])
-        none = fold.nothing if number else 0.0
-        some = fold.total if number else -np.inf
+        none, some = (fold.nothing, fold.total) if number else (0.0, -np.inf)
         share = 1 / (1 + np.exp(np.clip(none - some, -700.0, 700.0)))
-        sigma = max(float(np.linalg.norm(fold.left)) / np.sqrt(max(fold.degrees, 1)), fold.least)
-        errors = (1 - share) * beyond[:, 0]
-        logs, weights = [_log_density(beyond[:, 0], reach, sigma, lost)], [max(1 - share, 1e-300)]
+        sigma = max(float(np.sqrt(max(fold.square, 0.0) / max(fold.degrees, 1))), fold.least)
+        errors, log, lost = _predicted(given, out, root, sigma)
+        logs, weights, errors = [log], [max(1 - share, 1e-300)], (1 - share) * errors
         known = sum(v.probability for v in versions)
-        for k, version in enumerate(versions):
-            own, weight = beyond[:, 1 + ends[k] : 1 + ends[k + 1]], share * version.probability / known
-            mean, covariance, sigma = fold.fitted(version)
-            root = np.linalg.cholesky(covariance / sigma**2)
-            errors = errors + weight * (beyond[:, 0] - own @ mean)
-            logs.append(_log_density(beyond[:, 0] - own @ mean, np.hstack([reach, own @ root]), sigma, lost))
-            weights.append(weight)
-        found.append(HeldOutErrors(root_of_noise @ errors, float(scipy.special.logsumexp(logs, b=weights))))
-        if number and versions:
-            fold, ordered = fold.with_function(versions[0]), ordered.with_columns(versions[0].amplitude * columns[0])
+        for version in versions:
+            columns = version.amplitude * whole.families[version.family].columns[:, version.index]
+            own, log, _ = _predicted(given.with_noise(columns), out, root, fold.fitted(version)[2])
+            weights.append(share * version.probability / known)
+            errors = errors + weights[-1] * own
+            logs.append(log)
+        found.append(HeldOutErrors(root @ errors, float(scipy.special.logsumexp(logs, b=weights))))
+        if versions and number < functions:
+            columns = versions[0].amplitude * whole.families[versions[0].family].columns[:, versions[0].index]
+            fold, given = fold.with_function(versions[0]), given.with_noise(columns)
     return found, lost
 
 
-def _log_density(error: Floats, factor: Floats, sigma: float, lost: int) -> float:
-    """Of errors (h,), mm, with the covariance σ²·(1 + factor·factorᵀ), in h less the dimensions that are lost."""
-    U, s, _ = np.linalg.svd(factor, full_matrices=False)
-    seen = U.T @ error / sigma
-    rest = error / sigma - U @ seen
-    log = -0.5 * float(rest @ rest + np.sum(seen**2 / (1 + s**2)) + np.sum(np.log1p(s**2)))
-    return log - (len(error) - lost) * float(np.log(sigma * np.sqrt(2 * np.pi)))
+def _predicted(given: FunctionFit, out: NDArray[np.bool_], root: Floats, sigma: float) -> tuple[Floats, float, int]:
+    """Errors (h,) of what is held out, over its root (h, h), their log density, and dimensions that the others leave open.
+
+    With the precision P of all the errors are P⁺·(P·y) in what is held out, and have the covariance σ²·P⁺.
+    """
+    values, vectors = np.linalg.eigh(root.T @ given.precision[np.ix_(out, out)] @ root)
+    told = values > _OPEN
+    values, vectors = values[told], vectors[:, told]
+    along = vectors.T @ (root.T @ (given.precision[out] @ given.y)) / values
+    log = 0.5 * float(np.sum(np.log(values)) - values @ along**2 / sigma**2)
+    return vectors @ along, log - len(values) * float(np.log(sigma * np.sqrt(2 * np.pi))), int(np.sum(~told))
 
 
 def improvements(result: SearchResult, data: FunctionFit, functions: int) -> list[Improvement]:
@@ -271,16 +312,11 @@ def improvement_by(result: SearchResult, data: FunctionFit, columns: Floats) -> 
     return _compared(_held_out(result, data, 0), _held_out(result, more, 0), 0, *rms)
 
 
-@dataclass(frozen=True, eq=False)
-class _HeldOut:
-    """Rms (f,) of held-out errors, µm, and log densities (folds, f), without a function, with one, and so on."""
-
-    rms: Floats
-    density: Floats
-    unseen: Text
+_HeldOut = tuple[Floats, Floats, Text]
 
 
 def _held_out(result: SearchResult, data: FunctionFit, functions: int) -> _HeldOut:
+    """Rms (f,) of held-out errors, µm, log densities (folds, f), without a function, with one, and so on, and of what."""
     groups, unseen = held_out_groups(result.first.model)
     scale, folds = result.first.comparison.noise_scale, min(len(np.unique(groups)), FOLDS)
     squares, count, logs = np.zeros(functions + 1), 0, list[list[float]]()
@@ -290,28 +326,19 @@ def _held_out(result: SearchResult, data: FunctionFit, functions: int) -> _HeldO
         squares += [float(np.sum((one.errors * scale[out]) ** 2)) for one in each]
         count += int(out.sum()) - lost
         logs.append([one.log_density for one in each])
-    return _HeldOut(np.sqrt(squares / max(count, 1)) / MICROMETRE, np.array(logs), unseen)
+    return np.sqrt(squares / max(count, 1)) / MICROMETRE, np.array(logs), unseen
 
 
 def _compared(before: _HeldOut, after: _HeldOut, number: int, rms: float, rms_after: float) -> Improvement:
-    gain = after.density[:, number] - before.density[:, 0]
+    gain = after[1][:, number] - before[1][:, 0]
     se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else np.inf
-    held = float(before.rms[0]), float(after.rms[number])
-    return Improvement(rms, rms_after, *held, float(gain.sum()), se, before.unseen)
+    return Improvement(rms, rms_after, float(before[0][0]), float(after[0][number]), float(gain.sum()), se, before[2])
 
 
 def residuals(data: FunctionFit, functions: int) -> Iterator[Floats]:
     """What no function leaves of the observations (m,), one, two …, each at its most probable."""
-    given = np.zeros((len(data.y), 0))
     beside = data
-    for number in range(functions + 1):
-        z = data.rest(given)
-        mean = np.linalg.solve(z.T @ z + np.eye(z.shape[1]), z.T @ data.left)
-        basis, among, _ = data.told
-        rest = data.y - given @ mean
-        yield rest - data.free @ (among @ (basis.T @ data.white(rest)))
-        if number < functions:
-            version = beside.versions(1)[0]
-            beside = beside.with_function(version)
-            columns = version.amplitude * data.families[version.family].columns[:, version.index]
-            given = np.hstack([given, columns])
+    yield data.covariance @ (data.precision @ data.y)
+    for _ in range(functions):
+        beside = beside.with_function(beside.versions(1)[0])
+        yield data.covariance @ (beside.precision @ data.y)

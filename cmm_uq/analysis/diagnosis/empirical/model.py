@@ -262,9 +262,8 @@ def _stated(term: FunctionTerm, parts: Sequence[str], sizes: Sequence[float]) ->
     formula = " + ".join(f"{name}*({part}){term.factor}" for name, part in zip(names, each, strict=True))
     priors = [f'{{ unit = "µm", prior = {_PRIOR * max(size, 0.01):.2g} }}' for size in sizes]
     parameters = ", ".join(f"{name} = {prior}" for name, prior in zip(names, priors, strict=True))
-    name = "_".join(
-        ("empirical", term.of.replace("_mm", "").replace(",", "_"), str(term.along), *filter(None, [term.lever]))
-    )
+    of = term.of.replace("_mm", "").replace(",", "_")
+    name = "_".join(("empirical", of, str(term.along), *filter(None, [term.lever])))
     return f'[[effect]]\nname = "{name}"\nformula = "e_{term.along} = {formula}"\nparameters = {{ {parameters} }}\n'
 
 
@@ -279,9 +278,7 @@ def best_known(result: SearchResult) -> BestKnown | None:
     odds = float(np.exp(min(max(first.log_odds[functions], default=-np.inf) - first.log_odds[best], 700.0)))
     member = first.comparison.beside((), (best,))[best][1].member
     columns = first.explanations[best].members[member].columns / first.comparison.noise_scale[:, None]
-    alone = replace(
-        evidence.FunctionFit.of(result, ()), free=first.comparison.baseline
-    )  # with nothing that was asserted
+    alone = replace(evidence.FunctionFit.of(result, ()), free=first.comparison.baseline)  # with nothing asserted
     effect, combinations = effect_of(first.explanations[best]), result.combinations
     probability = 0.0 if combinations is None else combinations.of(best)
     gain = evidence.improvement_by(result, alone, columns)

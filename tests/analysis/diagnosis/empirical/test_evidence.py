@@ -74,6 +74,13 @@ def test_the_true_function_is_the_most_probable(fit: FunctionFit) -> None:
     assert abs(mean[0] - 0.02) < 3 * np.sqrt(covariance[0, 0])
 
 
+def alone(fit: FunctionFit, rows: np.ndarray) -> FunctionFit:
+    """Some of the observations, as if no others had been measured."""
+    families = [replace(one, columns=one.columns[rows]) for one in fit.families]
+    covariance = fit.covariance[np.ix_(rows, rows)]
+    return replace(fit, y=fit.y[rows], free=fit.free[rows], covariance=covariance, families=families)
+
+
 def conditional(fit: FunctionFit, out: np.ndarray, added: Floats, sigma: float) -> tuple[Floats, Floats]:
     """Mean and covariance of y[out] given the others, with b normal and very wide, by the dense joint covariance."""
     wide = 1e8 * fit.free @ fit.free.T + fit.covariance + added
@@ -86,8 +93,8 @@ def test_without_functions_predictions_are_those_of_the_joint_normal_distributio
     out = np.zeros(M, dtype=bool)
     out[[4, 5, 13]] = True
     (before, _), lost = predictions(fit, out, 1)
-    fold = fit.at(~out)
-    sigma = np.sqrt(fold.left @ fold.left / fold.degrees)
+    fold = alone(fit, ~out)
+    sigma = np.sqrt(fold.square / fold.degrees)
     mean, covariance = conditional(fit, out, np.zeros((M, M)), float(sigma))
     assert lost == 0
     told = stats.multivariate_normal(mean, covariance).logpdf(fit.y[out])
@@ -101,19 +108,19 @@ def test_a_function_that_is_certain_predicts_as_a_column_of_the_model(fit: Funct
     """With one version alone the average is that version: the joint normal distribution with its columns."""
     out = np.zeros(M, dtype=bool)
     out[[0, 7, 20]] = True
-    alone = replace(fit, families=[family(fit.families[0].columns[:, [2]], "a", 40.0)])
-    (_, after), _ = predictions(alone, out, 1)
-    fold = alone.at(~out)
+    certain = replace(fit, families=[family(fit.families[0].columns[:, [2]], "a", 40.0)])
+    (_, after), _ = predictions(certain, out, 1)
+    fold = alone(certain, ~out)
     versions = [v for v in fold.versions() if v.probability > 1e-3]
     total, logs = sum(v.probability for v in versions), []
     for version in versions:
-        column = version.amplitude * alone.families[0].columns[:, 0]
-        mean, covariance = conditional(alone, out, column @ column.T, fold.fitted(version)[2])
+        column = version.amplitude * certain.families[0].columns[:, 0]
+        mean, covariance = conditional(certain, out, column @ column.T, fold.fitted(version)[2])
         logs.append(
-            stats.multivariate_normal(mean, covariance).logpdf(alone.y[out]) + np.log(version.probability / total)
+            stats.multivariate_normal(mean, covariance).logpdf(certain.y[out]) + np.log(version.probability / total)
         )
     order = [*np.flatnonzero(~out), *np.flatnonzero(out)]
-    scale = np.log(np.diag(np.linalg.cholesky(alone.covariance[np.ix_(order, order)]))[-3:]).sum()
+    scale = np.log(np.diag(np.linalg.cholesky(certain.covariance[np.ix_(order, order)]))[-3:]).sum()
     assert after.log_density == pytest.approx(float(special.logsumexp(logs)) + scale, abs=1e-3)
     assert np.abs(after.errors).max() < 0.03
 
@@ -138,6 +145,67 @@ def test_residuals_without_a_function_are_those_of_generalised_least_squares(fit
     none, one = residuals(fit, 1)
     assert none == pytest.approx(told, abs=1e-9)
     assert np.linalg.norm(one) < 0.5 * np.linalg.norm(none)
+
+
+def left_out(of: str) -> tuple[FunctionFit, np.ndarray]:
+    """Set-ups of six observations, each quantity twice, with noise in common, and what is left out of them."""
+    random, setup, quantity = np.random.default_rng(7), np.repeat(np.arange(6), 6), np.repeat(np.arange(18), 2)
+    m, out = len(setup), np.zeros(len(setup), dtype=bool)
+    free = random.standard_normal((18, 3))[quantity]
+    if of in ("set-up", "several"):  # whose offset is free
+        free = np.hstack([free, np.eye(6)[setup]])
+    covariance = np.eye(m) + 0.7 * (quantity[:, None] == quantity) + 0.3 * (setup[:, None] == setup)
+    families = [
+        family(random.standard_normal((18, 9, r))[quantity], str(r), float(np.log(r / 9))) for r in (1, 2, 5, 1)
+    ]
+    families[0].columns[:, 0] = (setup == 2)[:, None]  # seen in one set-up alone
+    out[{"some": [3, 4, 20], "repeat": [8], "set-up": setup == 2, "several": (setup == 2) | (quantity < 7)}[of]] = True
+    y = 0.02 * families[0].columns[:, 4, 0] + 0.01 * families[1].columns[:, 3, 0] + 0.003 * random.standard_normal(m)
+    sigma = np.geomspace(1e-4, 1e-1, 300)
+    return FunctionFit(y, free, covariance, families, sigma, np.full(300, -np.log(300)), 1e-3), out
+
+
+@pytest.mark.parametrize("of", ["some", "repeat", "set-up", "several"])
+def test_what_is_left_out_changes_the_evidence_as_if_it_had_not_been_measured(of: str) -> None:
+    """Against the same of the other observations alone, with one function and with two given, each time computed anew."""
+    whole, out = left_out(of)
+    fold, anew = whole.without(out), alone(whole, ~out)
+    assert whole.degrees - fold.degrees == int(out.sum()) - {"set-up": 1, "several": 3}.get(of, 0)
+    for _ in range(3):
+        assert fold.degrees == anew.degrees
+        assert fold.square == pytest.approx(anew.square, rel=1e-9)
+        for found, told in zip(fold.products, anew.products, strict=True):
+            for each, own in zip(found, told, strict=True):
+                assert each == pytest.approx(own, rel=1e-9, abs=1e-9 * float(np.abs(own).max()))
+        for (log, sizes), (own, of_own) in zip(fold.evidence, anew.evidence, strict=True):
+            assert log == pytest.approx(own, rel=1e-9)
+            assert sizes == pytest.approx(of_own, rel=1e-9)
+        first, second = fold.versions(), anew.versions()
+        assert [(v.family, v.index) for v in first[:5]] == [(v.family, v.index) for v in second[:5]]
+        for one, other in zip(fold.fitted(first[0]), anew.fitted(second[0]), strict=True):
+            assert one == pytest.approx(other, rel=1e-8)
+        given = first[0].amplitude * anew.families[first[0].family].columns[:, first[0].index]
+        fold, anew = fold.with_function(first[0]), replace(anew, covariance=anew.covariance + given @ given.T)
+
+
+def test_a_second_function_predicts_beside_the_first_as_the_joint_normal_distribution() -> None:
+    """With one version of each alone: the first as noise of its size, the second as noise beside it."""
+    whole, out = left_out("some")
+    one, other = (family(whole.families[0].columns[:, [k]], str(k), prior) for k, prior in ((4, 80.0), (5, 40.0)))
+    (_, _, after), _ = predictions(replace(whole, families=[one, other]), out, 2)
+    fold, logs, weights = alone(replace(whole, families=[one, other]), ~out), list[float](), list[float]()
+    first = fold.versions()[0]
+    given = first.amplitude * (one, other)[first.family].columns[:, 0]
+    anew = replace(fold, covariance=fold.covariance + given[~out] @ given[~out].T)
+    versions = [v for v in anew.versions() if v.probability > 1e-3]
+    for v in versions:
+        added = v.amplitude * (one, other)[v.family].columns[:, 0]
+        mean, covariance = conditional(whole, out, given @ given.T + added @ added.T, anew.fitted(v)[2])
+        logs.append(float(stats.multivariate_normal(mean, covariance).logpdf(whole.y[out])))
+        weights.append(v.probability / sum(each.probability for each in versions))
+    order = [*np.flatnonzero(~out), *np.flatnonzero(out)]
+    scale = np.log(np.diag(np.linalg.cholesky(whole.covariance[np.ix_(order, order)]))[-int(out.sum()) :]).sum()
+    assert after.log_density == pytest.approx(float(special.logsumexp(logs, b=weights)) + scale, abs=1e-3)
 
 
 X, COUNT = np.linspace(0.0, 900.0, 80), np.arange(5.0, 16.0, 0.35)
