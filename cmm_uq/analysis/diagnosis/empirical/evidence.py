@@ -119,8 +119,8 @@ class FunctionFit:
         return self._precise[1]
 
     def rest(self, columns: Floats) -> Floats:
-        """What the free columns leave of others (m, r), whitened."""
-        return np.asarray(self.root.T @ (self.precision @ columns))
+        """What the free columns leave of others (m, …), whitened."""
+        return np.asarray(np.tensordot(self.root.T @ self.precision, columns, 1))
 
     @cached_property
     def square(self) -> float:

@@ -188,6 +188,17 @@ def test_what_is_left_out_changes_the_evidence_as_if_it_had_not_been_measured(of
         fold, anew = fold.with_function(first[0]), replace(anew, covariance=anew.covariance + given @ given.T)
 
 
+def test_products_of_what_is_left_are_those_with_the_precision() -> None:
+    """Of one column, of several, and of functions of several coefficients each."""
+    fit, _ = left_out("set-up")
+    root = np.linalg.cholesky(fit.covariance)
+    basis = linalg.orth(linalg.solve_triangular(root, fit.free, lower=True), rcond=1e-9)
+    for columns in (fit.y, fit.free[:, :2], fit.families[1].columns):
+        white = linalg.solve_triangular(root, columns.reshape(len(fit.y), -1), lower=True)
+        left = (white - basis @ (basis.T @ white)).reshape(columns.shape)
+        assert fit.rest(columns) == pytest.approx(left, abs=1e-10)
+
+
 def test_a_second_function_predicts_beside_the_first_as_the_joint_normal_distribution() -> None:
     """With one version of each alone: the first as noise of its size, the second as noise beside it."""
     whole, out = left_out("some")
