@@ -120,7 +120,7 @@ class FunctionFit:
 
     def rest(self, columns: Floats) -> Floats:
         """What the free columns leave of others (m, …), whitened."""
-        return np.asarray(np.tensordot(self.root.T @ self.precision, columns, 1))
+        return np.asarray(np.tensordot(self.root.T, np.tensordot(self.precision, columns, 1), 1))
 
     @cached_property
     def square(self) -> float:
