@@ -60,8 +60,7 @@ def job_schema(
     each = {kind: schema_of(table) for kind, table in tables.items()}
     keys["artefact"] = {"description": keys["artefact"]["description"], **chosen_by("kind", each, "Kinds")}
     known = {"enum": list(effects), "x-taplo": {"docs": {"enumValues": list(effects.values())}}}
-    stated = keys["effect"]["items"]["properties"]["name"]  # any other is one of the job's own
-    own = {"type": "string", "pattern": stated["pattern"]}
+    own = {"type": "string", "pattern": keys["effect"]["items"]["properties"]["name"]["pattern"]}  # of the job's own
     keys["model"]["properties"]["effects"]["items"] = {"anyOf": [known, own]}
     named = {"properties": {"model": {"properties": {"effects": {"items": {"enum": list(effects)}}}}}}
     # an arm has effects of its own

@@ -113,8 +113,8 @@ def spheres(
 
 def oriented(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     """Five orientations of five points each, in two places of the sphere."""
-    of = {"orientations": ORIENTATIONS, "points": ORIENTED_POINTS}
-    what = say("{orientations} orientations of {points} points each, in two places a quarter of the reach apart", **of)
+    what = say("{orientations} orientations of {points} points each, in two places a quarter of the reach apart",
+               orientations=ORIENTATIONS, points=ORIENTED_POINTS)  # fmt: skip
     return (_two_places(artefact, what, ORIENTATIONS, ORIENTED_POINTS, recorded=recorded), _reach(artefact)[1])
 
 

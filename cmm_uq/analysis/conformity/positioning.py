@@ -256,21 +256,16 @@ def conditions(
     few += list(_short_of_travel(runs, artefact)) if of is axes else []
     for number, run in runs.items():
         if not _enough(run):
-            told = {"number": number, "repeats": run.repeats, "targets": len(run.targets), "bare": 100 * _bare(run)}
-            few.append(
-                say(
-                    "measurement {number}: {repeats} runs, {targets} targets, {bare:.0f} % of the run without one",
-                    **told,
-                )
-            )
+            few.append(say("measurement {number}: {repeats} runs, {targets} targets, {bare:.0f} % of the run without one",
+                           number=number, repeats=run.repeats, targets=len(run.targets), bare=100 * _bare(run)))  # fmt: skip
         read = recorded and np.ptp(run.x) > 0  # and not planned beside a recording
         if read and run.both and np.array_equal(run.x[0], run.x[1]):
             few.append(say("measurement {number}: both directions are the same to the last digit", number=number))
         alike = np.all(run.x[..., :, None] == run.x[..., None, :], axis=(0, 1)) & ~np.eye(run.repeats, dtype=bool)
         if read and alike.any():
             first, second = (np.argwhere(alike)[0] + 1).tolist()
-            told = {"number": number, "first": first, "second": second}
-            few.append(say("measurement {number}: repeat {second} is repeat {first} to the last digit", **told))
+            few.append(say("measurement {number}: repeat {second} is repeat {first} to the last digit",
+                           number=number, first=first, second=second))  # fmt: skip
     what = _TURNS if of is axes and artefact.angular else what
     return (Condition(what, tuple(few) if runs else (what,)),)
 

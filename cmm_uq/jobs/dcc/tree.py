@@ -105,8 +105,7 @@ def _named(name: str) -> str:
 def serialised(root: Node) -> bytes:
     """A file of a tree: UTF-8, two spaces a level, the same bytes for the same tree."""
     declared = {f"xmlns:{prefix}": uri for prefix, uri in NAMESPACES.items() if prefix != "ds"}
-    parts = ['<?xml version="1.0" encoding="UTF-8"?>\n', *_lines(root, declared, "")]
-    return "".join(parts).encode()
+    return "".join(['<?xml version="1.0" encoding="UTF-8"?>\n', *_lines(root, declared, "")]).encode()
 
 
 def _lines(node: Node, declared: Mapping[str, str], indent: str) -> Iterator[str]:

@@ -26,7 +26,7 @@ from cmm_uq.jobs.importing.lengths.place_columns import place_columns
 _RULE = re.compile(r"[-=_*+|.\s]*")
 DATED = re.compile(r"\d{4}[./-]\d{1,2}[./-]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,4}|\d:\d\d|年")
 _PRINTED, _BRACKETS = re.compile(r"\d[.,]\d"), re.compile(r"\([^)]*\)")
-_FORMULA = re.compile(r"(?<=\S)(?<![XYZxyz])\s*[=＝](?=.*[^\W\d]).*", re.DOTALL)  # that says how a column was computed
+_FORMULA = re.compile(r"(?s)(?<=\S)(?<![XYZxyz])(?<![(\[ ,;]k)\s*[=＝](?=.*[^\W\d]).*")  # how a column was computed
 _LETTERED = re.compile(r"(?:\b[Xx] [Yy] [Zz]|\b[Ii] [Jj] [Kk])$")
 _SPREAD = re.compile(r"\d\s?[sσ]")  # above a column, and no figure
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
@@ -62,7 +62,7 @@ class CutSheet:
         self.figures = [[None if c == "" else figure(c, self.sign) for c in row] for row in sheet.rows]
         self.matched: set[str] = set()  # of what the job calls columns, what is there
         self.above: dict[int, list[str]] = {}  # of each row of figures, the title of its line and what follows it
-        self._columns: dict[int, dict[str, list[int]]] = {}  # of coordinates of lines, by block
+        self.places: dict[int, dict[str, list[int]]] = {}  # of coordinates of lines, by block
         self.touched: dict[int, float] = {}  # to which step starts and ends are printed, where they were measured
         self.blocks = self._titled(list(self._blocks()))
         self.block_of = {row: block for block in self.blocks for row in block.rows}
@@ -276,8 +276,8 @@ class CutSheet:
     def says(self, row: int) -> tuple[str, ...]:
         """What may say where the line of a row lies: titles above it, texts beside it, columns of starts and ends."""
         block, texts = self.block_of[row], [*self.above.get(row, ())]
-        if (columns := self._columns.get(block.number)) is None:
-            columns = self._columns[block.number] = place_columns(self, block)
+        if (columns := self.places.get(block.number)) is None:
+            columns = self.places[block.number] = place_columns(self, block)
         for i, own in enumerate(self.figures[row]):
             if own is None and (text := self.text(row, i)):
                 role = places.role_among(heading(block.paths[i]) if i < len(block.paths) else "")

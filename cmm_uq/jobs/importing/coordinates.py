@@ -353,6 +353,7 @@ def rows_of_axes(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -
         three = ((c, c.values[: len(own)].reshape(-1, 3)) for c in columns)
         apart = [c.i for c, values in three if np.isfinite(values).all() and np.ptp(values, axis=1).any()]
         reading.collect(grid, own, columns, [i, *(c.i for c in fine), *apart])
+        reading.read.add(i)
         if not _threes([{**one, ("name", ""): stem} for one, stem in zip(reading.beside, stems, strict=True)]):
             return None
         for k in range(0, len(own), 3):

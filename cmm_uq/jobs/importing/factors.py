@@ -267,8 +267,7 @@ def codes(values: Sequence[object]) -> Ints:
 
 def fixes(a: Ints, b: Ints) -> bool:
     """Whether the one says the other."""
-    pairs = np.unique(a * (int(b.max(initial=0)) + 1) + b)
-    return len(pairs) == len(np.unique(a))
+    return len(np.unique(a * (int(b.max(initial=0)) + 1) + b)) == len(np.unique(a))
 
 
 def together(first: Ints, *others: Ints) -> Ints:

@@ -137,11 +137,6 @@ def _labels(found: Sequence[Counted]) -> Iterator[Counted | None]:
             yield Label("", values, "part"), both, word
 
 
-def _a_chain(xyz: Floats) -> bool:
-    """Whether each place is as far from the next as any other, as on a ring or a row, so that any number of them is alike."""
-    return bool(np.ptp(np.linalg.norm(np.diff(xyz, axis=0), axis=1)) < _RIGID_MM)
-
-
 def _copied(ways: Sequence[Grouping], xyz: Floats) -> bool:
     """Whether rows in turn come again elsewhere, and are no rows of a lattice."""
     way = next((way for way in ways if way.rank and way.of and way.of[0].sort == "turn"), None)
@@ -185,7 +180,9 @@ def _grouped(of: Counted | None, found: Sequence[Counted], place: Ints, xyz: Flo
             if of and of[0].sort in ("title", "sheet") and not rank and at.max() == place.max():
                 rank = _MOVED * all(_on_a_ball(xyz[first][own == one]) for one in range(int(own.max()) + 1))
             if of and of[0].sort == "turn":
-                rank = 0.0 if _a_chain(xyz[first]) else min(rank, _AT_LEAST) if each < _SEVERAL else rank
+                # as far from the next as any other, as on a ring or a row: any number of them is alike
+                chain = np.ptp(np.linalg.norm(np.diff(xyz[first], axis=0), axis=1)) < _RIGID_MM
+                rank = 0.0 if chain else min(rank, _AT_LEAST) if each < _SEVERAL else rank
         else:
             rank = _NAMED if names or _on_a_ball(xyz[first]) or _each_again(found, place) else 0.0
         told.append(Grouping(rank, of, measurement, at, point))
@@ -262,13 +259,9 @@ def _shape(xyz: Floats, measurement: Ints, point: Ints) -> str:
 
 def on_a_plate(xyz: Floats, *, oblong: bool = False) -> bool:
     """Whether places (n, 3) lie in one plane, on one square grid; or on an oblong one of three rows and columns at least."""
-    if len(xyz) < 6:
+    if len(xyz) < 6 or np.linalg.svd(about := xyz - xyz.mean(axis=0))[1][2] > _EVEN_MM * np.sqrt(len(xyz)):
         return False
-    about = xyz - xyz.mean(axis=0)
-    if np.linalg.svd(about)[1][2] > _EVEN_MM * np.sqrt(len(xyz)):
-        return False
-    apart = np.linalg.norm(xyz[1:] - xyz[0], axis=1)
-    one = xyz[1 + int(apart.argmin())] - xyz[0]
+    one = xyz[1 + int(np.linalg.norm(xyz[1:] - xyz[0], axis=1).argmin())] - xyz[0]
     pitch = np.linalg.norm(one)
     at = (xyz - xyz[0]) @ np.column_stack([one, np.cross(np.linalg.svd(about)[2][2], one)]) / pitch
     rows = np.diff(np.sort(at[:, 1])).max() if oblong else pitch

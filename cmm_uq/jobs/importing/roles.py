@@ -14,12 +14,12 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.base.values import dataclass, field, replace
-from cmm_uq.jobs.columns import OPTIONAL
+from cmm_uq.jobs.columns import COORDINATES, OPTIONAL
 from cmm_uq.jobs.importing.blocks import DATED, Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import SMALL, unit_of
 from cmm_uq.jobs.importing.factors import LINE, Label, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, WrittenUnit, converted, sort_of, unit_named
-from cmm_uq.jobs.importing.header import plain_words, understood, unspaced, without_unit, words_of
+from cmm_uq.jobs.importing.header import WORD, Header, plain_words, understood, unspaced, without_unit, words_of
 
 Role = Literal["summary", "deviation", "reference", "measured", "target", "nominal"]
 _IN_TURN: tuple[Role, ...] = ("summary", "deviation", "reference", "measured", "target", "nominal")
@@ -157,7 +157,7 @@ class SheetReading:
     labels: list[Labels] = field(default_factory=list)
     figures: list[tuple[float, ...]] = field(default_factory=list)  # reference, measured; x, y, z; target, deviation
     taken: dict[str, Sequence[FigureColumn]] = field(default_factory=dict)  # by column of a recording
-    unused: list[str] = field(default_factory=list)
+    read: set[int] = field(default_factory=set)  # numbers of columns beside those taken that are in it
     positions: bool = False  # of runs: whether they are what positions were reached less their targets
     covariates: dict[str, list[float]] = field(default_factory=dict)  # further columns of a recording, in their units
     blank: list[tuple[int, int]] = field(default_factory=list)  # row and column of measured values that are not there
@@ -209,8 +209,19 @@ class SheetReading:
             ):
                 self.further[name] = converted(c.values, c.unit, name) if c.unit and sort else c.values
         self.beside = _beside(grid, rows, used | {c.i for c in columns if c.role == "deviation" and c.minute})
-        names = ((c.i, c.heading) for c in columns if called[c.i] not in self.further)
-        self.unused = [name for i, name in names if i not in used and name and not hint(name, lengths=True)]
+        self.read |= {c.i for c in columns if called[c.i] in self.further and c.i not in used}
+
+    def unused(self, grid: CutSheet, head: Header, used: Sequence[str], *, placed: bool = False) -> list[str]:
+        """Heads of columns with anything in the rows that are read, neither taken nor in what tells observations apart."""
+        words = {word.casefold() for word in used}
+        places = grid.places[grid.block_of[self.rows[0]].number] if placed else {}
+        beside = self.read.union(*(three for three in places.values() if len(three) == len(COORDINATES)))
+        for (sort, name), text in ((key, text) for labels in self.labels for key, text in labels.items()):
+            i, _, above = name.partition(" ")
+            if sort == "column" and not words.isdisjoint((above.strip().casefold(), *WORD.findall(text.casefold()))):
+                beside.add(int(i))
+        left = [i for i in head.unused if i not in beside and any(grid.text(row, i) for row in self.rows)]
+        return list(dict.fromkeys(head.headings[i].strip() for i in left))
 
     def add(
         self, row: int, k: int, column: FigureColumn, beside: Sequence[FigureColumn], figures: tuple[float, ...]

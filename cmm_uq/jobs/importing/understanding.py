@@ -298,7 +298,8 @@ class Understanding:
             system = formats.UNITS["inch" if small.name == "microinch" else "mm"]
             stated = [(system, say("as its deviations are in {unit}", unit=Verbatim(small.name)))]
         figures, points = np.array(self.reading.figures).T, self.reading.kind == "points"
-        if points and not stated and small is not None and not any(unit_of([one]) for one in self.reading.unused):
+        beside = self.reading.unused(self.grid, self.header, ()) if points else []
+        if points and not stated and small is not None and not any(unit_of([one]) for one in beside):
             what = f"the file mentions {small.name} alone, which may be the unit of the places"
             raise NotReadError(what, where=where, fix=f'Say unit = "{small.name}", or unit = "mm"')
         largest = float(np.nanmax(np.ptp(figures, axis=1) if points else figures))
@@ -310,11 +311,11 @@ class Understanding:
         written = {name: [(own, None, 0)] for name, own in named if np.isfinite(own).all()}
         return settled_unit(stated, where, lambda: by_extent(written, where, reach_mm))
 
-    def facts(self, of_unit: Fact, used: Sequence[str]) -> tuple[Fact, ...]:
+    def facts(self, of_unit: Fact, used: Sequence[str], *, placed: bool = False) -> tuple[Fact, ...]:
         words = (word for word in dict.fromkeys(used) if word)
         heads = [say("heads of columns") if word.isdecimal() else Verbatim(word) for word in words]
         arithmetic = say("words and figures, {count} of them by arithmetic", count=self.reading.checked)
-        unused = [name for name in dict.fromkeys(self.reading.unused) if name not in used]
+        unused = self.reading.unused(self.grid, self.header, used, placed=placed)
         sheet = [one.name for one in self.sheets] if self.sheets[0].name else []
         return (
             *([Fact("sheet", say("Sheet"), commas(names(sheet)))] if sheet else []),
@@ -358,7 +359,8 @@ class Understanding:
         bare_ = [None if np.isnan(one) else float(one) for one in reference]
         return MeasuredLengths(
             *(lines, bare_, runs.tolist(), measured.tolist(), own.lines, own.covariates, self.sources),
-            *(self.facts(of_unit, used), tuple(self.left_out), places, words_beside(lines, stated)),
+            *(self.facts(of_unit, used, placed=bool(places)), tuple(self.left_out)),
+            *(places, words_beside(lines, stated)),
         )
 
     def axis_places(self, runs: Sequence[AxisRun]) -> dict[str, tuple[str, str]]:

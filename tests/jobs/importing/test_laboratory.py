@@ -168,7 +168,7 @@ def test_every_row_and_column_that_is_left_out_is_named_with_why() -> None:
         facts["left_out"]
         == "line 3: 'Mean 100.0', a summary; line 4: 'soaked anew', a remark; line 2, column Run 2 (mm): nothing in the cell"
     )
-    assert facts["not_used"] == "MPE"
+    assert facts["not_used"] == "Line, MPE"  # there is one line alone
     assert len(table.lines) == 6
 
 

@@ -43,6 +43,7 @@ wrongly (letters of two planes as the ends of bars); five are there.
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from collections import defaultdict
@@ -55,6 +56,7 @@ import pytest
 
 from cmm_uq.app.commands.jobs.exchange import read_export
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.cells.encodings import decoded
 from cmm_uq.jobs.importing.format import ImportKeys
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError
 
@@ -250,3 +252,45 @@ def test_it_is_read_as_its_author_reads_it(name: str) -> None:
 def test_what_no_figure_settles_is_asked(name: str) -> None:
     with pytest.raises(CmmUqError, match=f'Say unit = (.*or unit = )?"{ASKED[number(name)]}"'):
         read_export(EXPECTED[name].with_name(name))
+
+
+def columns_of(name: str, head: Sequence[str], lines: Sequence[int]) -> list[tuple[str, list[str]]]:
+    """Heads of a delimited file with the cells below each in the lines that are read, where all of these are as long."""
+    text = decoded(EXPECTED[name].with_name(name).read_bytes(), name, None)[0].splitlines()
+    for delimiter in ";\t,":
+        rows = [[cell.strip() for cell in row] for row in csv.reader(text, delimiter=delimiter)]
+        if len(rows) == len(text) and len(head) > 2 and [*map(str.strip, head)] in rows:
+            own = [rows[line - 1] for line in lines]
+            return (
+                [*zip(head, map(list, zip(*own, strict=True)), strict=True)] if {*map(len, own)} == {len(head)} else []
+            )
+    return []
+
+
+DELIMITED = [name for name in EXPECTED if name.lower().endswith((".csv", ".txt", ".tsv"))]
+
+
+def test_every_column_is_in_the_reading_or_named_as_not_used() -> None:
+    """Of delimited files: where it is not named, it is empty, tells axes or names apart, or has places of lines."""
+    looked_at, silent = 0, []
+    for name in DELIMITED:
+        try:
+            found = read_export(EXPECTED[name].with_name(name), ImportKeys())
+            recognised, lines = found.recognised, [*map(int, found.lines)]
+        except UnplacedError as asked:
+            recognised, lines = asked.recognised, [line for one in asked.lengths for line in one.lines]
+        except CmmUqError:
+            continue
+        facts = {fact.key: str.__str__(fact.value) for fact in recognised.facts}
+        told = " ".join([*recognised.columns, *recognised.columns.values(), *facts.values()])
+        apart = {*re.findall(r"[^\W\d_]+", facts.get("told_apart", "").casefold())}
+        for head, cells in columns_of(name, recognised.head, lines):
+            looked_at += 1
+            of_axes = {text.upper() for text in cells} <= {*"XYZ"}
+            in_names = f"{cells[0]} is " in told or not apart.isdisjoint(re.findall(r"[^\W\d_]+", cells[0].casefold()))
+            of_places = "lines" in facts and re.search("[xyz]", head.casefold()) is not None
+            known = of_axes or in_names or of_places or head.strip().casefold() in ("i", "j", "k")
+            if any(cells) and head.strip() not in told and not known:
+                silent.append((name, head))
+    assert looked_at > 300
+    assert not silent

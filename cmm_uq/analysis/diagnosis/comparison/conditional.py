@@ -236,8 +236,7 @@ class Conditioning:
     def with_all(self, columns: Floats) -> Floats:
         """Inner products (k, K, r) of the stack's columns with others (k, m, r)."""
         kinds, _, r = columns.shape
-        each = self.stack.T @ _flat(columns)
-        return np.ascontiguousarray(each.reshape(-1, kinds, r).transpose(1, 0, 2))
+        return np.ascontiguousarray((self.stack.T @ _flat(columns)).reshape(-1, kinds, r).transpose(1, 0, 2))
 
     def kept(self, known: ConditionedData) -> bool:
         """Whether the inner products of all that is given are kept."""

@@ -95,8 +95,7 @@ def tail_widths(random: np.random.Generator, heavy: NDArray[np.bool_], count: in
     """Factors (count, draws) that make normal draws those of Student's t where these (draws,) are heavy, of one variance."""
     found = np.ones((count, len(heavy)))
     dof = random.choice(DEGREES, len(heavy))
-    square = (dof - 2) / random.chisquare(dof, found.shape)
-    found[:, heavy] = np.sqrt(square[:, heavy])
+    found[:, heavy] = np.sqrt((dof - 2) / random.chisquare(dof, found.shape))[:, heavy]
     return found
 
 

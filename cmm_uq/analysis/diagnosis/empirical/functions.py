@@ -300,8 +300,8 @@ def _letter(axis: str) -> Text:
 
 
 def _of_both(along: str, one: Text, other: str) -> Text:
-    of = {"direction": _letter(along), "axis": one, "other": _letter(other)}
-    return say("error along {direction} as a function of {axis} and {other}", **of)
+    way, across = _letter(along), _letter(other)
+    return say("error along {direction} as a function of {axis} and {other}", direction=way, axis=one, other=across)
 
 
 def _curve(along: str, one: Text, of: str, variable: str) -> FunctionTerm:
@@ -316,8 +316,8 @@ def _scale(axis: str, key: str, half: float, variable: str) -> FunctionTerm:
 
 
 def _turning(along: str, axis: str, lever: str, arm: Floats) -> FunctionTerm:
-    of = {"direction": _letter(along), "axis": _letter(axis), "lever": _letter(lever)}
-    title = say("error along {direction} as a function of {axis}, in proportion to {lever}", **of)
+    title = say("error along {direction} as a function of {axis}, in proportion to {lever}",
+                direction=_letter(along), axis=_letter(axis), lever=_letter(lever))  # fmt: skip
     middle, half = float(0.5 * (arm.min() + arm.max())), 0.5 * float(np.ptp(arm))
     factor = f"*({_variable(lever)} - {middle!r})/{half!r}"
     return FunctionTerm(reading_name(axis), title, along, lever, factor, _variable(axis))

@@ -60,8 +60,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     if any(isinstance(cell, str) and _SEVERAL.search(cell) for cell in cells):
         return None  # cells that were not cut apart
     told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
-    above = grid.sheet.rows[: min(taken)]
-    # what stands above a table comes again above each further page of it
+    above = grid.sheet.rows[: min(taken)]  # of a table, and again above each further page of it
     again = {row for row in range(min(taken), len(grid.sheet.rows)) if grid.sheet.rows[row] in above}
     first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
     for row in range(len(grid.sheet.rows)):

@@ -20,7 +20,7 @@ from cmm_uq.jobs.importing.format import FileKeys, Format, ImportKeys, format_of
 from cmm_uq.jobs.importing.header import printed_words, text_of
 
 _FIRST, _LAST, _LONGEST = 300, 60, 400  # lines at both ends that are looked at, and characters of one
-_SHOWN = 90  # characters of the words
+_SHOWN, _MOST = 90, 12  # characters of the words, and cells of a line that says what a machine is
 _CELLS = re.compile(r"[\t;|]|\s{2,}|\"?,\"|,(?!\d)|(?<!\d),")
 _WORDS = {name: "|".join(parts) for name, parts in printed_words("stated").items()}
 _MONTHS = _WORDS["months"].split("|")
@@ -169,11 +169,8 @@ def _days(lines: Sequence[Line]) -> Iterator[Offer]:
 
 
 def _date_in(text: str) -> re.Match[str] | None:
-    return next((found for one in _DATES if (found := one.search(text)) and (_known_month(found))), None)
-
-
-def _known_month(found: re.Match[str]) -> bool:
-    return "name" not in found.groupdict() or _month(found["name"]) > 0
+    found = (match for one in _DATES if (match := one.search(text)))
+    return next((one for one in found if "name" not in one.groupdict() or _month(one["name"]) > 0), None)
 
 
 def _month(name: str) -> int:
@@ -221,8 +218,8 @@ def _machines(lines: Sequence[Line]) -> Iterator[Offer]:
     for place, (number, text, cells) in enumerate(lines[:_LAST]):
         device, folded = _DEVICE.search(text), [*map(_folded, cells)]
         k, match = next(((k, m) for k, one in enumerate(folded) if (m := _MACHINE.match(one))), (0, None))
-        if device is None and match is None:
-            continue
+        if (device is None and match is None) or len(cells) > _MOST:
+            continue  # or the head of a table
         name = device[1] if device else cells[k].partition(match["rest"][0])[2] if match and match["rest"] else ""
         name = (name.strip(" .:=") or next((one for one in cells[k + 1 :] if device is None), "")).strip(" :")
         serial = _SERIAL.search(_folded(name))
