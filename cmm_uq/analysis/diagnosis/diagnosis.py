@@ -267,6 +267,7 @@ def _asserted(
             gone = (*gone, *weak.values())
         doubtful, beside = doubted(result)
         while doubtful:
+            tried |= frozenset(doubtful)  # none of them takes the place of another
             result, gone = withhold(result, frozenset(doubtful)), (*gone, *doubtful.values())
             doubtful, beside = doubted(result)
         result = _of_all(result, model)

@@ -127,6 +127,33 @@ def test_in_place_of_an_effect_of_open_size_stands_the_next_that_cannot_be_told_
     assert substitute(of, 0, frozenset({0, 1, 2})) is None, "each is tried once"
 
 
+def asserted(monkeypatch: pytest.MonkeyPatch, start: SearchResult, **further: Any) -> tuple[SearchResult, list[str]]:
+    """What is chosen in the end, and what is withheld, in turn; nothing is sampled."""
+    stubs: dict[str, Any] = {
+        "withhold_unresolved": lambda found: (found, ()), "_of_all": lambda found, _model: found,
+        "joint_posterior": lambda *_: None, "doubted": lambda _found: ({}, False), "least_supported": lambda _found: {},
+        "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
+    }  # fmt: skip
+    for name, stub in (stubs | further).items():
+        monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
+    found, _, withheld, _ = diagnosis._asserted(start, cast("Any", None), 0, None, None)
+    return found, [each.effect for each in withheld]
+
+
+def test_what_is_doubted_does_not_come_back_in_the_place_of_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The size of 0 is open; 1, the next in its place, has another form."""
+    start = found_with(((0,), 0.45), ((1,), 0.4), ((2,), 0.1), ((3,), 0.05), chosen=frozenset({0, 1}))
+
+    def of(found: SearchResult, number: int) -> dict[int, WithheldEffect]:
+        return {i: WithheldEffect(str(i), say("one"), 0.4, HOLDS_ZERO) for i in found.chosen if i == number}
+
+    monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(start, chosen=chosen))
+    found, withheld = asserted(
+        monkeypatch, start, doubted=lambda now: (of(now, 1), False), effects_without_size=lambda now, _joint: of(now, 0)
+    )
+    assert (found.chosen, withheld) == (frozenset(), ["1", "0"])
+
+
 def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
     """0.45, 0.40 and 0.10 in its place: the third is improbable, the second's size is open as well."""
     start = found_with(((0,), 0.45), ((1,), 0.4), ((2,), 0.1), ((3,), 0.05), chosen=frozenset({0}))
@@ -137,19 +164,9 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
         return {i: WithheldEffect(str(i), say("one"), 0.4, HOLDS_ZERO) for i in found.chosen}
 
     monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(start, chosen=chosen))
-    for name, stub in {
-        "withhold_unresolved": lambda found: (found, ()),
-        "_of_all": lambda found, _model: found,
-        "effects_without_size": open_size,
-        "joint_posterior": lambda *_: None,
-        "doubted": lambda _found: ({}, False),
-        "least_supported": lambda _found: {},
-        "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
-    }.items():
-        monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
-    found, _, withheld, _ = diagnosis._asserted(start, cast("Any", None), 0, None, None)
+    found, withheld = asserted(monkeypatch, start, effects_without_size=open_size)
     assert seen == [{0}, {1}, set()]
-    assert (found.chosen, [each.effect for each in withheld]) == (frozenset(), ["0"])
+    assert (found.chosen, withheld) == (frozenset(), ["0"])
 
 
 def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
@@ -163,19 +180,8 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
         listed = found.chosen if len(found.chosen) > 2 else ()
         return {i: WithheldEffect(str(i), say("one"), probability[i], HOLDS_ZERO) for i in listed}
 
-    for name, stub in {
-        "withhold_unresolved": lambda found: (found, ()),
-        "_of_all": lambda found, _model: found,
-        "effects_without_size": open_size,
-        "joint_posterior": lambda *_: None,
-        "doubted": lambda _found: ({}, False),
-        "least_supported": lambda _found: {},
-        "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
-        "substitute": lambda *_: None,
-    }.items():
-        monkeypatch.setattr(diagnosis if hasattr(diagnosis, name) else joint, name, stub)
-    found, _, withheld, _ = diagnosis._asserted(start, cast("Any", None), 0, None, None)
-    assert (found.chosen, [each.effect for each in withheld]) == (frozenset({0, 1}), ["2"])
+    found, withheld = asserted(monkeypatch, start, effects_without_size=open_size, substitute=lambda *_: None)
+    assert (found.chosen, withheld) == (frozenset({0, 1}), ["2"])
 
 
 @pytest.mark.long

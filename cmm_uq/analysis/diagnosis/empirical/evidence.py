@@ -258,9 +258,8 @@ class HeldOutErrors:
 def predictions(whole: FunctionFit, out: NDArray[np.bool_], functions: int) -> tuple[list[HeldOutErrors], int]:
     """Predict the observations ``out`` (m,) from the others without a function, with one, two …; dimensions that are open."""
     order, seen = np.concatenate([np.flatnonzero(~out), np.flatnonzero(out)]), int(np.sum(~out))
-    root = np.linalg.cholesky(whole.covariance[np.ix_(order, order)])[
-        seen:, seen:
-    ]  # of noise that the others do not tell
+    # of noise that the others do not tell
+    root = np.linalg.cholesky(whole.covariance[np.ix_(order, order)])[seen:, seen:]
     fold, given, found, lost = whole.without(out), replace(whole, families=()), list[HeldOutErrors](), 0
     for number in range(functions + 1):
         versions = [v for v in fold.versions() if v.probability > IMPROBABLE] if number else []

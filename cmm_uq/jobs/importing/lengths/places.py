@@ -104,8 +104,8 @@ def role_among(text: str) -> str:
 
 def _begun(word: str) -> str:
     """What a word without blanks begins with, as ``始点座標``."""
-    for of, those in words_of("places").items():
-        if any(unspaced(one) and len(one) > 1 and word.startswith(one) for one in those):
+    for of, those in words_of("places").items() if unspaced(word[:1]) else ():
+        if any(word.startswith(one) and len(one) > 1 and unspaced(one) for one in those):
             return of
     return ""
 
