@@ -110,7 +110,7 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     grid = chosen[0][1]
     whole = joined([reading for reading, _ in chosen])
     take_certified(whole, [*map(CutSheet, upright)])
-    return Understanding(whole, sheets, without, grid, elsewhere, across=grid in across)
+    return Understanding(whole, sheets, without, grid, chosen, elsewhere, across=grid in across)
 
 
 def _take_results(found: Sequence[Found], chosen: Sequence[Found]) -> None:
@@ -212,9 +212,8 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
     sheet, found = grid.sheet, list[Found]()
     problem: NotReadError | None = None
     for blocks, rows in each(grid):
-        usable = [
-            k for k in rows if not (is_summary(sheet.rows[k]) or left_out.is_void(sheet.rows[k], "void", "feature"))
-        ]
+        usable = [k for k in rows if not is_summary(sheet.rows[k])]
+        usable = [k for k in usable if not left_out.is_void(sheet.rows[k], "void", "feature")]
         deviations = left_out.below_deviations(grid, usable)  # beside what they are of
         own = _layout(grid, [row for row in usable if row not in deviations]) if usable else []
         readings: list[SheetReading] = []
@@ -261,6 +260,12 @@ def _layout(grid: CutSheet, rows: list[int]) -> list[int]:
     return [row for row in near if needed <= signs[row] or not grid.other_quantity(row)]
 
 
+def _head_of(reading: SheetReading, grid: CutSheet) -> Header:
+    block = grid.block_of[row := reading.rows[0]]
+    taken = {name: tuple(c.i for c in own if c.i >= 0) for name, own in reading.taken.items()}
+    return Header(block.head[-1] if block.head else row, block.rows[0], [heading(path) for path in block.paths], taken)
+
+
 @dataclass
 class Understanding:
     """What a file holds: places with their numbers, lengths on lines, or runs along axes."""
@@ -269,6 +274,7 @@ class Understanding:
     sheets: Sequence[Sheet]
     left_out: list[str]
     grid: CutSheet
+    parts: Sequence[Found]  # that make the reading, each with its sheet
     elsewhere: Elsewhere = ()  # that may say where lines lie
     across: bool = False  # whether rows and columns were exchanged
 
@@ -315,7 +321,8 @@ class Understanding:
         words = (word for word in dict.fromkeys(used) if word)
         heads = [say("heads of columns") if word.isdecimal() else Verbatim(word) for word in words]
         arithmetic = say("words and figures, {count} of them by arithmetic", count=self.reading.checked)
-        unused = self.reading.unused(self.grid, self.header, used, placed=placed)
+        each = [one.unused(grid, _head_of(one, grid), used, placed=placed) for one, grid in self.parts]
+        unused = dict.fromkeys(name for own in each for name in own)
         sheet = [one.name for one in self.sheets] if self.sheets[0].name else []
         return (
             *([Fact("sheet", say("Sheet"), commas(names(sheet)))] if sheet else []),
@@ -334,11 +341,7 @@ class Understanding:
     @property
     def header(self) -> Header:
         """Head of the first block that is read, and which of its columns are taken."""
-        row = self.reading.rows[0]
-        block = self.grid.block_of[row]
-        taken = {name: tuple(c.i for c in own if c.i >= 0) for name, own in self.reading.taken.items()}
-        first = block.head[-1] if block.head else row
-        return Header(first, block.rows[0], [heading(path) for path in block.paths], taken)
+        return _head_of(self.reading, self.grid)
 
     def lengths(self, keys: ImportKeys, where: str, reach_mm: float | None) -> MeasuredLengths:
         unit, of_unit = self.unit(keys, where, reach_mm)

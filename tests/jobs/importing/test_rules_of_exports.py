@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
+import openpyxl
 import pytest
 
 from cmm_uq.jobs.importing.format import ImportKeys, NotReadError
@@ -193,3 +196,17 @@ def test_a_number_that_every_row_has_for_itself_counts_no_runs() -> None:
     found = lengths("\n".join(["ID_Essai;Ligne;Répétition;Longueur étalonnée [mm];Longueur mesurée [mm]", *rows, ""]))
     assert found.names == ["A"] * 9 + ["B"] * 9
     assert found.repeat == [1, 1, 1, 2, 2, 2, 3, 3, 3] * 2
+
+
+def test_columns_that_are_left_out_are_named_of_every_sheet() -> None:
+    book = openpyxl.Workbook()
+    for number, further in ((1, ()), (2, ("Remark",))):
+        sheet = book.create_sheet(f"Line {number}")
+        sheet.append(["Calibrated mm", "Run 1 mm", "Run 2 mm", *further])
+        for n in NOMINAL:
+            sheet.append([n, n + 0.0004, n + 0.0007, *("soaked" for _ in further)])
+    del book["Sheet"]
+    book.save(content := io.BytesIO())
+    with pytest.raises(UnplacedError) as error:
+        imported(content.getvalue(), "x.xlsx", ImportKeys())
+    assert error.value.recognised.data["not_used"] == "Remark"

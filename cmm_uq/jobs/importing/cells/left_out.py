@@ -66,11 +66,8 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     for row in range(len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and first <= row < last and row not in heads:
             own = [grid.figure(row, k) for k in columns]
-            if (
-                None not in own
-                and any(f is not None and f[1] < 1 for f in own)
-                and not (grid.lettered(row) or grid.place(row))
-            ):
+            figured = None not in own and any(f is not None and f[1] < 1 for f in own)
+            if figured and not (grid.lettered(row) or grid.place(row)):
                 return None  # whatever else stands in it, it may be measured
             text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
             if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run
