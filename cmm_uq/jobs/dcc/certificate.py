@@ -17,138 +17,20 @@ from __future__ import annotations
 import datetime as dt
 import math
 import re
+import tomllib
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
 from decimal import Decimal, InvalidOperation
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, NoReturn, Self
 
 from cmm_uq.base.files.limits import NUMERAL
 from cmm_uq.base.values import dataclass
 
 VERSION = "3.2.1"  # of the schema that is written
-_MU = "factor=coverageFactor factor; probability=coverageProbability probability; distribution string?"
-_MUS = "factors=coverageFactorXMLList factor[]; probabilities=coverageProbabilityXMLList probability[]"
-_MUS = f"{_MUS}; distributions=distributionXMLList string[]?"
-_ENDS = "low=intervalMin decimal; high=intervalMax decimal; probability=coverageProbability probability; distribution string?"
-_REGION = "region=ellipsoidalRegion|rectangularRegion EllipsoidalRegion|RectangularRegion?"
-_VALUE = "label string?; value decimal; unit string; time=dateTime datetime?"
-_LIST = "label string?; time=dateTime datetime?"
-
-D_SI = f"""
-Expanded: uncertainty uncertainty; {_MU}
-Interval: standard=standardUnc uncertainty; {_ENDS}
-StandardMU: standard=valueStandardMU uncertainty; distribution string?
-ExpandedMU: uncertainty=valueExpandedMU uncertainty; {_MU}
-IntervalMU(Interval): standard=valueStandardMU uncertainty
-Univariate: stated=standardMU|expandedMU|coverageIntervalMU StandardMU|ExpandedMU|IntervalMU
-Real: {_VALUE};
-  uncertainty=expandedUnc|coverageInterval|measurementUncertaintyUnivariate Expanded|Interval|Univariate?
-Constant: {_VALUE}; uncertainty uncertainty?; distribution string?
-CovarianceElement: value decimal; unit string
-CovarianceColumn: covariances=covariance CovarianceElement+
-EllipsoidalRegion: columns=covarianceMatrix/column CovarianceColumn+; {_MU}
-RectangularRegion(EllipsoidalRegion):
-Complex: label string?; real=valueReal decimal?; imaginary=valueImag decimal?; magnitude=valueMagnitude decimal?;
-  phase=valuePhase decimal?; unit string?; phase_unit=unitPhase string?; time=dateTime datetime?; {_REGION}
-ExpandedList: uncertainties=uncertaintyXMLList uncertainty[]; {_MUS}
-IntervalList: standards=standardUncXMLList uncertainty[]; lows=intervalMinXMLList decimal[];
-  highs=intervalMaxXMLList decimal[]; probabilities=coverageProbabilityXMLList probability[];
-  distributions=distributionXMLList string[]?
-ExpandedListMU: uncertainties=valueExpandedMUXMLList uncertainty[]; {_MUS}
-StandardListMU: standards=valueStandardMUXMLList uncertainty[]; distributions=distributionXMLList string[]?
-UnivariateList: stated=standardMUXMLList|expandedMUXMLList StandardListMU|ExpandedListMU
-RealList: labels=labelXMLList string[]?; values=valueXMLList decimal[]; units=unitXMLList string[];
-  times=dateTimeXMLList datetime[]?;
-  uncertainty=expandedUncXMLList|coverageIntervalXMLList|measurementUncertaintyUnivariateXMLList
-  ExpandedList|IntervalList|UnivariateList?;
-  region=ellipsoidalRegionXMLList|rectangularRegionXMLList EllipsoidalRegion|RectangularRegion?
-ListUncertainty: stated=expandedUnc|coverageInterval Expanded|Interval
-RealInList: label string?; value decimal; unit string?; time=dateTime datetime?;
-  uncertainty=expandedUnc|coverageInterval Expanded|Interval?
-Reals: {_LIST}; unit=listUnit string?; uncertainty=listUnivariateUnc ListUncertainty?; values=real RealInList+; {_REGION}
-Bivariate: {_REGION}
-Complexes: {_LIST}; unit=listUnit string?; phase_unit=listUnitPhase string?; uncertainty=listBivariateUnc Bivariate?;
-  values=complex Complex+; {_REGION}
-Lists: {_LIST}; lists=realList|complexList|list Reals|Complexes|Lists+
-Hybrid: values=real|complex|list|realList|realListXMLList|complexList|constant
-  Real|Complex|Lists|Reals|RealList|Complexes|Constant+
-"""
-
-_NUMBERS = "identifications=identifications/identification IdentificationNumber"
-_CLASSES = "equipment_class EquipmentClass*; description Rich?"
-_SEALS = "seal=cryptElectronicSeal bool?; signature=cryptElectronicSignature bool?; time_stamp=cryptElectronicTimeStamp bool?"
-_NORMS = "norms=norm text*; references=reference text*"
-_OBTAINED = (
-    "methods=usedMethods/usedMethod Method*; software=usedSoftware/software Software*; equipment=measuringEquipments "
-    "Equipments?; conditions=influenceConditions/influenceCondition InfluenceCondition*"
-)
-_STATED = "metadata=measurementMetaData/metaData StatementMetadata*"
-
-DCC = f"""
-WithId: @id name?
-Identified(WithId): @ref_type=refType text[]?
-Referring(Identified): @ref_id=refId name[]?
-Described(Referring): name Words?; description Rich?
-LanguageText(Referring): text=. string; @language=lang language?
-Words(WithId): contents=content LanguageText+
-Latex(Referring): latex string?; mathml Markup?
-Markup(Referring): nodes=*
-Attached(Described): file_name text; mime_type text; data=dataBase64 bytes
-Rich(Referring): name Words?; contents=content|file|formula LanguageText|Attached|Latex*
-Software(Identified): name Words; release text; type software_type?; description Rich?
-RefTypeDefinition: name Words; description Rich?; namespace text; link text; release text?; value text?; procedure text?;
-  @ref_type=refType text[]?
-IdentificationNumber(Identified): issuer issuer; value text; name Words?
-Coordinates(Referring): system=positionCoordinateSystem text; reference text?; declaration Rich?;
-  first=positionCoordinate1 Real; second=positionCoordinate2 Real; third=positionCoordinate3 Real?
-Location!: city text*; country=countryCode country*; post_code text*; post_office_box text*; state text*; street text*;
-  street_number=streetNo text*; further Rich*; coordinates=positionCoordinates Coordinates*
-Somebody(Referring): name Words; email=eMail text?; phone text?; fax text?; location Location?;
-  description=descriptionData Attached?
-Contact(Somebody): location Location
-Hash(Identified): referral Words; referral_id=referralID text; procedure text; value text; description Rich?;
-  in_validity_range bool?; traceable bool?; linked=linkedReport Hash?
-EquipmentClass(Identified): reference text; class_id=classID text
-Characters: words=. text[]
-PrimitiveQuantity(Described): value=noQuantity|charsXMLList|si:real|si:hybrid|si:complex|si:constant|si:realListXMLList
-  Rich|Characters|Real|Hybrid|Complex|Constant|RealList
-Item(Identified): name Words; {_CLASSES}; software=installedSoftwares/software Software*; manufacturer Somebody?; model text?;
-  {_NUMBERS}+; quantities=itemQuantities/itemQuantity PrimitiveQuantity*
-Items: name Words?; {_CLASSES}; owner Contact?; manufacturer Somebody?; {_NUMBERS}*; items=item Item+
-PerformanceLocation(Referring): place=. place
-ReplacedReport(Identified): change=typeOfChange change; identifier=replacedUniqueIdentifier text
-CoreData: country=countryCodeISO3166_1 country; languages=usedLangCodeISO639_1 language+;
-  mandatory_languages=mandatoryLangCodeISO639_1 language+; identifier=uniqueIdentifier text; {_NUMBERS}*;
-  received=receiptDate date?; begin=beginPerformanceDate date; end=endPerformanceDate date;
-  location=performanceLocation PerformanceLocation; issued=issueDate date?; replaced=reportAmendedSubstituted ReplacedReport?;
-  previous=previousReport Hash?
-CalibrationLaboratory: code=calibrationLaboratoryCode text?; contact Contact; {_SEALS}
-Person(Identified): person Somebody; description Rich?; role text?; main_signer bool?; {_SEALS}
-Method(Identified): name Words; description Rich?; {_NORMS}
-Equipment(Identified): name Words; {_CLASSES}; certificate Hash?; manufacturer Somebody?; model text?; {_NUMBERS}*;
-  quantities=measuringEquipmentQuantities/measuringEquipmentQuantity PrimitiveQuantity*
-Equipments: name Words?; {_CLASSES}; owner Contact?; {_NUMBERS}*; equipment=measuringEquipment Equipment+
-Data(Referring): parts=text|formula|byteData|xml|quantity|list Rich|Latex|Attached|Markup|DccQuantity|QuantityList+
-InfluenceCondition(Identified): name Words; description Rich?; status state?; certificate Hash?; data Data
-StatementMetadata(Described): countries=countryCodeISO3166_1 country*; convention text?; traceable bool?; {_NORMS};
-  declaration Rich?; valid bool?; valid_list=validXMLList bool[]?; date date?; period string?;
-  authority=respAuthority Contact?; conformity conformity?; conformity_list=conformityXMLList conformity[]?; data Data?;
-  non_si_definition=nonSIDefinition text?; non_si_unit=nonSIUnit text?; location Location?
-RelativeUncertainty: stated=relativeUncertaintyXmlList|relativeUncertaintySingle RealList|Real
-DccQuantity(Described): value=noQuantity|charsXMLList|si:real|si:list|si:hybrid|si:complex|si:constant|si:realListXMLList
-  Rich|Characters|Real|Lists|Hybrid|Complex|Constant|RealList;
-  relative_uncertainty RelativeUncertainty?; {_OBTAINED}; {_STATED}
-QuantityList(Described): time=dateTime datetime?; times=dateTimeXMLList datetime[]?; parts=list|quantity
-  QuantityList|DccQuantity+; {_OBTAINED}; {_STATED}
-DccResult(Referring): name Words; description Rich?; data Data
-Measurement(Referring): name Words; description Rich?; {_OBTAINED}; results=results/result DccResult+; {_STATED}
-Administrative!: software=dccSoftware/software Software+; ref_types=refTypeDefinitions/refTypeDefinition RefTypeDefinition*;
-  core=coreData CoreData; items Items; laboratory=calibrationLaboratory CalibrationLaboratory; persons=respPersons/respPerson
-  Person+; customer Contact; statements=statements/statement StatementMetadata*
-Comment: nodes=*
-Certificate: @version=schemaVersion version?{VERSION}; administrative=administrativeData Administrative;
-  measurements=measurementResults/measurementResult Measurement+; comment Comment?; document Attached?; signatures=*
-"""  # the signatures are XAdES, as they stand: what they are worth is the business of cmm_uq.certificate.sign
+_CLASSES = tomllib.loads(Path(__file__).with_name("classes.toml").read_text(encoding="utf-8"))
+# the signatures are XAdES, as they stand: what they are worth is the business of cmm_uq.certificate.sign
+D_SI, DCC = (_CLASSES["classes"][name].format(VERSION=VERSION, **_CLASSES["parts"]) for name in ("d_si", "dcc"))
 
 
 @dataclass(frozen=True, eq=False)

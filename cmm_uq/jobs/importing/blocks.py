@@ -294,7 +294,11 @@ class CutSheet:
         # what was touched lies elsewhere each time
         digits = max(1, round(-np.log10(1000 * self.touched.get(block.number, 1e-13))))
         said = {of: "; ".join(f"{one:.{digits}f}".rstrip("0").rstrip(".") for one in own) for of, own in values.items()}
-        texts += [f"{of} ({said[of]})" for of, own in values.items() if len(own) == 3]
+        texts += [
+            f"{of} ({said[of]})" if len(own) == 3 else f"{of} = {said[of]}"
+            for of, own in values.items()
+            if len(own) == 3 or of in {*"XYZ"}
+        ]
         return tuple(texts)
 
     def _held(self, row: int, columns: Sequence[int], first: int) -> list[float]:

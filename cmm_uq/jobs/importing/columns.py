@@ -155,7 +155,7 @@ class ExportTable:
             self.rows, self.after = self._usable(needed)
             if not self.rows:
                 fix = "Export the table with its figures"
-                raise CmmUqError("has a header and no rows of figures", where=self.start, fix=fix)
+                raise NotReadError("has a header and no rows of figures", where=self.start, fix=fix)
             body = [[*sheet.rows[i][:width], *[""] * (width - len(sheet.rows[i]))] for i in self.rows]
             self.cells = list(zip(*body, strict=True))
 
@@ -301,7 +301,7 @@ class ExportTable:
             facts.append(Fact("header", say("Header"), Verbatim(self.start.removeprefix(self.where).lstrip(": "))))
         indices = [*header.unused, *(i for name in left_out for i in header.columns[name])]
         if unused := [header.headings[i] for i in indices]:
-            facts.append(Fact("not_used", say("Columns not used"), _first_of(unused, commas)))
+            facts.append(Fact("not_used", say("Columns not used"), _first_of(unused, commas), (*unused,)))
         if self.after:
             facts.append(Fact("after", say("Lines of text after the table"), number(self.after)))
         return [*facts, *left_out_fact(self.left_out)]

@@ -17,7 +17,7 @@ from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import SMALL, figure
-from cmm_uq.jobs.importing.factors import hint
+from cmm_uq.jobs.importing.factors import hint, says_of
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import without_unit
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, at_places, columns_in, like, said_by, words_above
@@ -114,7 +114,7 @@ def points_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> S
     """Places of rows below a head that names X, Y and Z, once or for several points side by side, or of columns alike."""
     rows = [row for row in rows if row not in grid.ends]
     columns = columns_in(grid, blocks, rows) if rows else []
-    lengths = [c for c in columns if c.may_be_length]
+    lengths = [c for c in columns if c.may_be_length and not any(says_of(text, "straight") for text in c.path)]
     named = _named(lengths, _levels(grid))
     triples, checked = _measured(_in_one_unit(named) or _bare(lengths), grid.at(min(rows, default=0)))
     checked = checked or sum(_deviates_from(own, lengths) for own in triples)

@@ -163,6 +163,14 @@ def hint(text: str, *, lengths: bool) -> str | None:
     return _SHORT.get(words[0]) if words and all(word.isdigit() for word in words[1:]) else None
 
 
+@lru_cache(maxsize=16_384)
+def says_of(text: str, *tables: str) -> bool:
+    """Whether a text says that deviations along an axis are angles, or something else of ``words.toml``."""
+    known = [word for table in tables or ("unit", "motion", "motion_axes") for word in words_of("angles")[table]]
+    plain = f" {' '.join(plain_words(text))} ".replace(" pitch error table ", " ").replace(" pitch error comp", " ")
+    return any(f" {word} " in plain or (unspaced(word) and word in plain) for word in known)
+
+
 def parts_of(label: Label) -> list[Label]:
     """The parts of names that are alike but for words and numbers; else what is ahead of a last number, and that number."""
     for cut in (str, lambda value: _CAMEL.sub(" ", _GLUED.sub(" ", value))):

@@ -7,12 +7,14 @@ Factors of units are quotients of whole numbers, so that 1.5 inch is the double 
 from __future__ import annotations
 
 import re
+import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import cache, partial
 from importlib import import_module
 from itertools import zip_longest
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
@@ -44,39 +46,9 @@ class WrittenUnit:
 
 LENGTH, TEMPERATURE, TIME, PRESSURE, SHARE = "length", "temperature", "time", "pressure", "share"
 
-_UNITS = (
-    (
-        WrittenUnit("mm", LENGTH),
-        "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros milimetr мм ㎜ 毫米 밀리미터 ミリ"
-        " millimètre millimètres milímetro milímetros milimetry millimetro ミリメートル",
-    ),
-    (
-        WrittenUnit("um", LENGTH, 1, 1000),
-        "µm um μm ㎛ 微米 micrometer micrometre micron microns mikrometer mikron micrometri мкм микрометр"
-        " micrometers micrometres micromètre micromètres micrómetro micrómetros",
-    ),
-    (WrittenUnit("nm", LENGTH, 1, 1_000_000), "nm nanometer nanometre"),
-    (WrittenUnit("microinch", LENGTH, 127, 5_000_000), "microinch microinches µin μin uin µpo μpo"),
-    (WrittenUnit("cm", LENGTH, 10), "cm centimeter centimetre zentimeter"),
-    (WrittenUnit("m", LENGTH, 1000), "m meter metre metri metros м"),
-    (
-        WrittenUnit("inch", LENGTH, 127, 5),
-        "in inch inches zoll po pouce pouces pollice pollici pulgada pulgadas \" ″ ''",
-    ),
-    (WrittenUnit("mil", LENGTH, 127, 5000), "mil mils thou"),
-    (WrittenUnit("ft", LENGTH, 1524, 5), "ft foot feet"),
-    (WrittenUnit("°C", TEMPERATURE), "°c c degc celsius grad ℃"),
-    (WrittenUnit("K", TEMPERATURE, offset=-273.15), "k kelvin"),
-    (WrittenUnit("°F", TEMPERATURE), "°f f degf fahrenheit ℉"),
-    (WrittenUnit("s", TIME), "s sec sek second seconds sekunde sekunden seconde secondi segundos"),
-    (WrittenUnit("ms", TIME, 1, 1000), "ms millisecond milliseconds"),
-    (WrittenUnit("min", TIME, 60), "min minute minutes minuten minuti minutos"),
-    (WrittenUnit("h", TIME, 3600), "h hour hours std stunde stunden heure heures ore horas"),
-    (WrittenUnit("hPa", PRESSURE), "hpa mbar"),
-    (WrittenUnit("Pa", PRESSURE, 1, 100), "pa"),
-    (WrittenUnit("kPa", PRESSURE, 10), "kpa"),
-    (WrittenUnit("%", SHARE), "% pct percent prozent %rh %rf"),
-)
+TABLES = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+"""Words of headings, rows and reports, and units, as laboratories write them."""
+_UNITS = [(WrittenUnit(name, *own), aliases) for name, (*own, aliases) in TABLES["units"].items()]
 UNITS: Mapping[str, WrittenUnit] = {alias: unit for unit, aliases in _UNITS for alias in aliases.split(" ")}
 LENGTHS = tuple(unit.name for unit, _ in _UNITS if unit.sort == LENGTH)
 FAHRENHEIT = UNITS["°f"]
@@ -205,6 +177,7 @@ class Fact:
     key: str
     label: Text
     value: Text
+    names: tuple[str, ...] = ()  # of what the value lists
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,9 +238,8 @@ class Recognition:
 
     @property
     def unused(self) -> tuple[str, ...]:
-        """Headings of columns that are not used, the first of them."""
-        listed = (str.__str__(fact.value) for fact in self.facts if fact.key == "not_used")
-        return tuple(name for names in listed for name in names.split(", "))
+        """Headings of columns that are not used."""
+        return tuple(name for fact in self.facts if fact.key == "not_used" for name in fact.names)
 
     @property
     def rows(self) -> list[tuple[Text, Text]]:

@@ -23,34 +23,17 @@ from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
-from cmm_uq.jobs.importing.factors import (
-    RUN,
-    codes,
-    counted,
-    in_turn,
-    numbered_runs,
-    parts_of,
-    run_apart,
-    senses,
-    together,
-)
 from cmm_uq.jobs.importing.format import (
     LINE_PLACE,
     SAME_PLACE,
     UNITS,
     Fact,
     ImportKeys,
-    NotReadError,
     Row,
     Sheet,
-    length_named,
 )
-from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
-from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
-from cmm_uq.jobs.importing.lengths.placing import place_of_axis
+from cmm_uq.jobs.importing.lengths.placing import DIAGONAL, place_of_axis
 from cmm_uq.jobs.importing.reports import TextReport
-from cmm_uq.jobs.importing.roles import SheetReading
 
 REFERENCE = "reference_mm"
 COLUMNS = ("line", "length_mm", "nominal_mm", "deviation_um", "deviation_mm", REFERENCE, "repeat")
@@ -305,88 +288,10 @@ class Rtl(TextReport):
             targets = [(found.targets[k], deviation, line) for k, deviation, line in own]
             way = sense if len(set(senses)) > 1 else 0
             runs.append(AxisRun(axis, way, senses[: i + 1].count(sense), targets))
-        place = place_of_axis(axis, (f"{name}: {text}" for name, text in found.facts.items()), 1.0, ".")
+        place = place_of_axis(
+            axis, (f"{name}: {text}" for name, text in found.facts.items()), 1.0, ".", sorted(found.targets)
+        )
         return placed_runs(runs, keys, where, (encoding,), {axis: place} if place else {})
-
-
-_MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
-_FINEST_UM, _LEAST_UM = 0.002, 0.05  # finer and smaller than machines are known in µm: these are in the unit of targets
-
-
-def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
-    """Runs along axes, each with its targets in turn."""
-    figures, labels = np.array(reading.figures), reading.every_label
-    if (angle := _angle_in(sheets)) is not None:
-        fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
-        raise NotReadError(f"its deviations may be angles ({angle!r})", where=where, fix=fix)
-    stated = reading.unit or unit_elsewhere(sheets, small=False)
-    unit = stated or UNITS["mm"]
-    small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
-    small = small or length_named(sheets[0].unit or "")
-    most, finest = np.abs(figures[:, 1]).max(), min(c.step for c in reading.taken["reading_um"])
-    if small is None and finest < _FINEST_UM and most < _LEAST_UM:
-        small = stated
-    if small is None and most < _MILLIMETRES:
-        fix = "Write it above them: (µm) or (mm)"
-        raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
-    target = units.converted(figures[:, 0], unit, "x_mm")
-    turn = not (reading.positions or reading.checked) and turned_by(
-        sheets, (c.heading for c in reading.taken["reading_um"]), where, targets=True
-    )
-    deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um") * (-1 if turn else 1)
-    named = [
-        [find(value) or find(f"{label.words} {value}") for value in label.values]
-        for find in (axis_in, letter_in)
-        for label in labels
-    ]
-    axes = next((own for own in named if all(own)), [_axis_of(sheets)] * len(target))
-    ways = senses(labels, target.tolist())
-    parts = [one for label in labels for one in (label, *run_apart(label, lengths=True), *parts_of(label))]
-    run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
-    key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
-    numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
-    if ways is None:  # by the order of their targets; none where all are listed in one order
-        ends = {n: target[numbers == n][[0, -1]] for n in np.unique(numbers).tolist()}
-        turns = {n: int(np.sign(last - first)) for n, (first, last) in ends.items()}
-        ways = [turns[n] if len({*turns.values()}) > 1 else 0 for n in numbers.tolist()]
-    runs: dict[tuple[str, int, int], AxisRun] = {}
-    rows = zip(target.tolist(), deviation.tolist(), reading.lines, strict=True)
-    for one, row in zip(zip(axes, ways, numbers.tolist(), strict=True), rows, strict=True):
-        runs.setdefault(one, AxisRun(*one, [])).targets.append(row)
-    if any(len({t for t, _, _ in run.targets}) < len(run.targets) for run in runs.values()):
-        raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
-    return list(runs.values())
-
-
-_AXES = "axis|achse|axe|asse|eje|eixo|osa|oś|axel|軸|轴|축"
-_AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES})", re.IGNORECASE)
-
-
-def _angle_in(sheets: Sequence[Sheet]) -> str | None:
-    """A text that says that deviations are angles."""
-    known = [word for words in words_of("angles").values() for word in words]
-    for text in (cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str) and cell):
-        plain = f" {' '.join(plain_words(text))} ".replace(" pitch error table ", " ")  # of a screw
-        if any(f" {word} " in plain or (unspaced(word) and word in plain) for word in known):
-            return text
-    return None
-
-
-def axis_in(text: str) -> str:
-    found = _AXIS_NAME.search(text)
-    return (found[1] or found[2]).upper() if found else ""
-
-
-def letter_in(text: str) -> str:
-    """The one letter of an axis that stands alone in a text."""
-    found = {*re.findall(r"(?<![^\W_])[XYZ](?![^\W_])", text)}
-    return found.pop() if len(found) == 1 else ""
-
-
-def _axis_of(sheets: Sequence[Sheet]) -> str:
-    """The axis that the first texts of a file name."""
-    texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
-    return next(filter(None, map(axis_in, texts)), "1")
 
 
 def axis_place(name: str) -> tuple[str, str, str]:
@@ -394,4 +299,5 @@ def axis_place(name: str) -> tuple[str, str, str]:
     axis = name if name in "XYZ" else ""
     known = ",".join("0" if one == axis else "?" for one in "XYZ")
     begins = ",".join("0" if one == (axis or "X") else str(100 * k) for k, one in enumerate("XYZ", 1))
-    return f"along {axis} from {known}" if axis else "", f"along {axis or 'X'} from {begins}", ""
+    example = "from 100,200,300 to 500,600,700" if DIAGONAL.search(name) else f"along {axis or 'X'} from {begins}"
+    return f"along {axis} from {known}" if axis else "", example, ""

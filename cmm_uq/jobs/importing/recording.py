@@ -24,7 +24,8 @@ from cmm_uq.jobs.importing.columns import columns_of
 from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import Fact, Format, ImportKeys, NotReadError, Recognition, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of
-from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, axis_runs, placed, placed_runs
+from cmm_uq.jobs.importing.lengths.axis_runs import axis_runs
+from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, placed, placed_runs
 from cmm_uq.jobs.importing.roles import at_places, said
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
@@ -151,7 +152,8 @@ def _understood(
     if reading.kind == "runs":
         runs = axis_runs(reading, understood.sheets, where)
         stated = understood.axis_places(runs)
-        sheet = placed_runs(runs, keys, where, stated=stated)[0]
+        labels = [label.words for label in reading.every_label if len({*label.values}) > 1]
+        sheet = placed_runs(runs, keys, where, understood.passed_over(labels), stated)[0]
         header = header_of(sheet, keys.model_copy(update={"columns": {}}), where, POINTS)
         assert header is not None  # of the head that was written  # noqa: S101
         table = _points(sheet, header, keys, where, reach_mm, begun, points=True)

@@ -163,6 +163,7 @@ class SheetReading:
     blank: list[tuple[int, int]] = field(default_factory=list)  # row and column of measured values that are not there
     bare: Sequence[int] = ()  # numbers of columns that no head names
     others: Sequence[int] = ()  # rows that belong to it
+    passed: Sequence[str] = ()  # of runs: heads of columns, and titles of rows, of other errors of the axis
     beside_lengths: bool = False  # whether they are places beside something else, as where a length was measured
     planned: bool = False  # whether lengths beside them say so
     summaries: list[int] = field(default_factory=list)  # rows of another table, of means of this one

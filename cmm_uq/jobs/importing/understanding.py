@@ -27,16 +27,16 @@ from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_ax
 from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import on_a_plate, places
-from cmm_uq.jobs.importing.header import LINES_BEFORE, Header, is_summary, shown
+from cmm_uq.jobs.importing.header import Header, is_summary, shown
+from cmm_uq.jobs.importing.lengths.axis_runs import axis_in
 from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
 from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of, take_certified
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
-from cmm_uq.jobs.importing.lengths.places import says_figures
-from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, stated_places, words_beside
+from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, said_elsewhere, stated_places, words_beside
 from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
-from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths, axis_in
+from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths
 from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, joined, said_by
 
@@ -97,7 +97,7 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     if not chosen or (chosen[0][0].kind == "points" and not counted):
         return None
     left_out.refuse_unmatched([grid for _, grid in chosen], keys, where)
-    elsewhere = _said_elsewhere(upright, chosen)
+    elsewhere = said_elsewhere(upright, chosen)
     _refuse_same_lines(chosen, where)
     apart = [(grid.sheet, reading) for reading, grid in found if all(grid is not other for _, other in chosen)]
     without = [shown(sheet, reading.rows[0], "another table") for sheet, reading in apart]
@@ -194,28 +194,15 @@ def _refuse_same_lines(chosen: Sequence[Found], where: str) -> None:
         raise NotReadError(what, where=where, fix=f'Say which: sheet = "{first}"')
 
 
-def _said_elsewhere(sheets: Sequence[Sheet], chosen: Sequence[Found]) -> Elsewhere:
-    """Rows that are not read and may say where lines lie, each with the text in its first cell; none of places themselves."""
-    if chosen[0][0].kind == "points":
-        return []
-    taken = {(grid.sheet.name, line) for reading, grid in chosen for line in reading.lines}
-    found = []
-    for grid in map(CutSheet, sheets):
-        for row in range(min(len(grid.sheet.rows), LINES_BEFORE)):
-            if (grid.sheet.name, grid.sheet.lines[row]) not in taken:
-                texts = grid.says(row) if row in grid.block_of else [grid.line(row)]
-                found.append((grid.text(row, 0), "\n".join(texts), grid.sheet.name))
-    return [one for one in found if says_figures(one[1])]
-
-
 def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
     sheet, found = grid.sheet, list[Found]()
     problem: NotReadError | None = None
     for blocks, rows in each(grid):
         usable = [k for k in rows if not is_summary(sheet.rows[k])]
         usable = [k for k in usable if not left_out.is_void(sheet.rows[k], "void", "feature")]
-        deviations = left_out.below_deviations(grid, usable)  # beside what they are of
-        own = _layout(grid, [row for row in usable if row not in deviations]) if usable else []
+        angles = left_out.below_angles(grid, usable)
+        others = left_out.below_deviations(grid, usable) | angles  # beside what they are of
+        own = left_out.layout(grid, [row for row in usable if row not in others]) if usable else []
         readings: list[SheetReading] = []
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
@@ -240,24 +227,16 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
             readings = [o for o in readings if not (o.beside_lengths and (any(called) or (o.planned and called)))]
             reading = max(readings, key=lambda one: len({*one.rows, *one.others}))
             reading.lines = [sheet.lines[row] for row in reading.rows]
+            reading.passed = [
+                *reading.passed,
+                *(text for row in angles for text in grid.block_of[row].titles[row].values()),
+            ]
             found.append((reading, grid))
         elif own:
             problem = problem or circle_in(grid, blocks, own)
     if problem is not None and not found:
         raise problem
     return found
-
-
-def _layout(grid: CutSheet, rows: list[int]) -> list[int]:
-    """Rows that have figures where most of them have."""
-    fine = {k for row in rows for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1}
-    signs = {row: frozenset(k for k in fine if grid.figure(row, k)) for row in rows}
-    many = [own for own in signs.values() if len(own) > 1]
-    most = many if len(many) >= 0.4 * len(rows) else [*signs.values()]  # and not the second line of each
-    common = Counter(k for own in most for k in own)
-    needed = {k for k, n in common.items() if n > 0.6 * len(most)}
-    near = [row for row in rows if len(signs[row] & needed) * 2 >= len(needed)]
-    return [row for row in near if needed <= signs[row] or not grid.other_quantity(row)]
 
 
 def _head_of(reading: SheetReading, grid: CutSheet) -> Header:
@@ -305,7 +284,14 @@ class Understanding:
             stated = [(system, say("as its deviations are in {unit}", unit=Verbatim(small.name)))]
         figures, points = np.array(self.reading.figures).T, self.reading.kind == "points"
         beside = self.reading.unused(self.grid, self.header, ()) if points else []
-        if points and not stated and small is not None and not any(unit_of([one]) for one in beside):
+        if points and not stated and small is not None and any(unit_of([one]) == small for one in beside):
+            stated = [
+                (
+                    formats.UNITS["inch" if small.name == "microinch" else "mm"],
+                    say("as its deviations are in {unit}", unit=Verbatim(small.name)),
+                )
+            ]
+        elif points and not stated and small is not None:
             what = f"the file mentions {small.name} alone, which may be the unit of the places"
             raise NotReadError(what, where=where, fix=f'Say unit = "{small.name}", or unit = "mm"')
         largest = float(np.nanmax(np.ptp(figures, axis=1) if points else figures))
@@ -321,17 +307,21 @@ class Understanding:
         words = (word for word in dict.fromkeys(used) if word)
         heads = [say("heads of columns") if word.isdecimal() else Verbatim(word) for word in words]
         arithmetic = say("words and figures, {count} of them by arithmetic", count=self.reading.checked)
-        each = [one.unused(grid, _head_of(one, grid), used, placed=placed) for one, grid in self.parts]
-        unused = dict.fromkeys(name for own in each for name in own)
         sheet = [one.name for one in self.sheets] if self.sheets[0].name else []
         return (
             *([Fact("sheet", say("Sheet"), commas(names(sheet)))] if sheet else []),
             *(*self.sheets[0].facts, of_unit, Fact("decimal", say("Decimal sign"), SIGNS[self.grid.sign])),
             Fact("understood", say("Columns understood by"), arithmetic),
             Fact("told_apart", say("Told apart by"), commas(heads or [DASH])),
-            *([Fact("not_used", say("Columns not used"), commas(names(unused)))] if unused else []),
-            *left_out_fact(self.left_out),
+            *self.passed_over(used, placed=placed),
         )
+
+    def passed_over(self, used: Sequence[str], *, placed: bool = False) -> list[Fact]:
+        """Columns and rows that are not read."""
+        each = [one.unused(grid, _head_of(one, grid), used, placed=placed) for one, grid in self.parts]
+        unused = dict.fromkeys(name for own in each for name in own)
+        columns = [Fact("not_used", say("Columns not used"), commas(names(unused)), (*unused,))] if unused else []
+        return [*columns, *left_out_fact(self.left_out)]
 
     @property
     def sources(self) -> dict[str, str]:
@@ -375,7 +365,10 @@ class Understanding:
             own = zip(self.reading.lines, self.reading.labels, strict=True)
             texts = [text for line, labels in own if line in lines for text in labels["place", ""].split("\n")]
             texts += [line for _, text, _ in self.elsewhere if len(axes) == 1 for line in text.split("\n")]
-            place = place_of_axis(axis, dict.fromkeys(texts), unit.up / unit.down, self.grid.sign)
+            targets = sorted(
+                target / (unit.up / unit.down) for run in runs if run.axis == axis for target, *_ in run.targets
+            )
+            place = place_of_axis(axis, dict.fromkeys(texts), unit.up / unit.down, self.grid.sign, targets)
             found |= {axis: place} if place else {}
         return found
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -11,7 +12,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.jobs.importing import header
 from cmm_uq.jobs.importing.blocks import CutSheet, heading
 from cmm_uq.jobs.importing.columns import LARGEST_MACHINE_MM
-from cmm_uq.jobs.importing.factors import LINE, RUN, hint
+from cmm_uq.jobs.importing.factors import LINE, RUN, hint, says_of
 from cmm_uq.jobs.importing.format import UNITS, Cell, NotReadError, Sources, sources_of
 from cmm_uq.jobs.importing.header import plain_words, words_of
 from cmm_uq.jobs.importing.roles import SheetReading, said
@@ -30,6 +31,12 @@ def below_deviations(grid: CutSheet, rows: Iterable[int]) -> set[int]:
     return small if small and max(sizes[1], default=np.inf) < 0.1 * max(sizes[0], default=0.0) else set()
 
 
+def below_angles(grid: CutSheet, rows: Iterable[int]) -> set[int]:
+    """Rows below a title that says that they hold angles, where others have none."""
+    counts = {row: sum(map(says_of, grid.block_of[row].titles[row].values())) for row in rows if row in grid.block_of}
+    return {row for row, count in counts.items() if count > min(counts.values())}
+
+
 def is_void(row: Sequence[Cell], *tables: str) -> bool:
     """Whether a cell of a row says that it is no measured point or length."""
     known = frozenset().union(*(words_of("rows")[table] for table in tables))
@@ -40,6 +47,18 @@ def is_void(row: Sequence[Cell], *tables: str) -> bool:
         words += [own[:-1] for own in words if len(own) > 1 and own[-1].isdigit() and " ".join(own[:-1]) in formed]
     void = words_of("rows")["void"] - words_of("lengths")["run"] if "void" in tables else frozenset[str]()
     return any(" ".join(own) in known or (len(own) > 1 and own[0] in void) for own in words)  # as ``VOID - air alarm``
+
+
+def layout(grid: CutSheet, rows: list[int]) -> list[int]:
+    """Rows that have figures where most of them have."""
+    fine = {k for row in rows for k, f in enumerate(grid.figures[row]) if f is not None and f[1] < 1}
+    signs = {row: frozenset(k for k in fine if grid.figure(row, k)) for row in rows}
+    many = [own for own in signs.values() if len(own) > 1]
+    most = many if len(many) >= 0.4 * len(rows) else [*signs.values()]  # and not the second line of each
+    common = Counter(k for own in most for k in own)
+    needed = {k for k, n in common.items() if n > 0.6 * len(most)}
+    near = [row for row in rows if len(signs[row] & needed) * 2 >= len(needed)]
+    return [row for row in near if needed <= signs[row] or not grid.other_quantity(row)]
 
 
 def of_feature(grid: CutSheet, row: int) -> bool:
@@ -62,7 +81,9 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
     above = grid.sheet.rows[: min(taken)]  # of a table, and again above each further page of it
     again = {row for row in range(min(taken), len(grid.sheet.rows)) if grid.sheet.rows[row] in above}
+    angles = below_angles(grid, grid.block_of)
     first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
+    told += [header.shown(grid.sheet, row, "a head again") for row in sorted(heads & again) if row < last]
     for row in range(len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and first <= row < last and row not in heads:
             own = [grid.figure(row, k) for k in columns]
@@ -80,7 +101,8 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
         known = row in summed or (readings[0].kind == "points" and of_feature(grid, row))
         if figures and within and not known and not _known(grid, row, figures, rows, columns):
             return None
-        told += [header.shown(grid.sheet, row, header.SUMMARY)] if figures and row > first else []
+        why = "angles" if row in angles else header.SUMMARY
+        told += [header.shown(grid.sheet, row, why)] if figures and row > first else []
     blank = [cell for one in readings for cell in one.blank if cell[0] not in again]
     if any(map(str.isdigit, "".join(grid.text(row, i) for row, i in blank))):
         return None
@@ -93,7 +115,9 @@ def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[in
     cells, block = grid.sheet.rows[row], grid.block_of[row].rows
     if header.is_summary(cells) or is_void(cells, "void", "feature"):
         return True
-    if row in below_deviations(grid, [row, *rows]) or _of_preamble(grid, row, rows, columns):
+    if row in below_deviations(grid, [row, *rows]) | below_angles(grid, [row, *rows]) or _of_preamble(
+        grid, row, rows, columns
+    ):
         return True
     if said(*(grid.text(row, k) for k in range(len(cells)) if k not in figures)) == "summary":
         return True

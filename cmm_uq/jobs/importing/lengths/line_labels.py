@@ -13,10 +13,10 @@ from cmm_uq.jobs.importing import factors
 from cmm_uq.jobs.importing.factors import LINE, POINT, RUN, Counted, Label, codes, counted, counting, fixes, hint
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import plain_words, words_of
+from cmm_uq.jobs.importing.lengths.axis_runs import letter_in
 from cmm_uq.jobs.importing.lengths.places import says_figures
-from cmm_uq.jobs.importing.lines import letter_in
 
-_PLACED = re.compile(r"\w+ \([^()]*;[^()]*\)")  # figures of columns of starts, ends and directions
+_PLACED = re.compile(r"\w+ \([^()]*;[^()]*\)|^[XYZ] = \S+$", re.M)  # figures of columns of starts, ends and directions
 _FEW = 4  # references that may differ by chance
 
 

@@ -40,6 +40,10 @@ def place_columns(grid: CutSheet, block: Block) -> dict[str, list[int]]:
     six = [(i, axes[i]) for i, _ in heads if len(axes[i]) == 1]
     if [axis for _, axis in six] == [*"XYZ"] and not by_words:
         return {"": [i for i, _ in six]}  # of what stands ahead of them
+    if len({axis for _, axis in six}) == len(six) < len("XYZ") and not by_words:
+        found = {axis: [i] for i, axis in six if i == 0 or axis == last[i].split()[0].upper()}
+        steps = [f[1] for own in found.values() for row in block.rows if (f := grid.figure(row, own[0]))]
+        return found if min(steps, default=0.0) >= _MEASURED else by_words  # at which lengths were measured
     if "".join(axis for _, axis in six) != "XYZXYZ":
         return by_words
     found = {places.START: [i for i, _ in six[:3]], places.END: [i for i, _ in six[3:]]}

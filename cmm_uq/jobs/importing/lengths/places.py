@@ -336,7 +336,7 @@ def _sense(axes: set[str], start: float, longest: float, others: Sequence[float]
     """Which way a line goes from its start: as a sign says, else towards where other lines lie."""
     if signs := {one[0] for one in axes if len(one) > 1}:
         return signs.pop() if len(signs) == 1 else ""
-    up, down = (sum(a <= one <= a + longest for one in others) for a in (start, start - longest))
+    up, down = (sum(a <= one <= a + longest for one in others if one != start) for a in (start, start - longest))
     return "+" if up > down or (up == down == 0 and 0 <= start < longest) else ""
 
 

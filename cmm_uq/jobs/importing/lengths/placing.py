@@ -9,15 +9,22 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 import numpy as np
 
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.importing.blocks import CutSheet
 from cmm_uq.jobs.importing.factors import LINE, hint
+from cmm_uq.jobs.importing.format import Sheet
+from cmm_uq.jobs.importing.header import LINES_BEFORE
 from cmm_uq.jobs.importing.lengths.places import full_place, place_of_line, place_text, said_in, says_figures
+from cmm_uq.jobs.importing.roles import SheetReading
 
+AXES = {*"XYZ"}
 _NEAR_MM = 1.0  # by which places are rounded
 _SHOWN = 160  # characters of the words of a place
 _LABEL = 30  # characters of the name of a line elsewhere
 _WORDS = 60  # characters of what stands beside a line
-_DIAGONAL = re.compile(
-    r"diag|[uú]hlop|przek|átló|köşegen|対角|对角|對角|대각|диагон|(?<![^\W_])(?:XY|XZ|YZ|XYZ)(?![^\W_])", re.IGNORECASE
+DIAGONAL = re.compile(
+    r"diag|[+-]?X ?[+-]Y ?[+-]Z|\b[PN]{3}\b"
+    r"|[uú]hlop|przek|átló|köşegen|対角|对角|對角|대각|диагон|(?<![^\W_])(?:XY|XZ|YZ|XYZ)(?![^\W_])",
+    re.IGNORECASE,
 )
 Elsewhere = Sequence[tuple[str, str, str]]
 """Rows that are no lengths: the first cell of each, its text, and its sheet."""
@@ -50,6 +57,20 @@ def stated_places(
             if place and "?" not in place:
                 break
     return found
+
+
+def said_elsewhere(sheets: Sequence[Sheet], chosen: Sequence[tuple[SheetReading, CutSheet]]) -> Elsewhere:
+    """Rows that are not read and may say where lines lie, each with the text in its first cell; none of places themselves."""
+    if chosen[0][0].kind == "points":
+        return []
+    taken = {(grid.sheet.name, line) for reading, grid in chosen for line in reading.lines}
+    found = []
+    for grid in map(CutSheet, sheets):
+        for row in range(min(len(grid.sheet.rows), LINES_BEFORE)):
+            if (grid.sheet.name, grid.sheet.lines[row]) not in taken:
+                texts = grid.says(row) if row in grid.block_of else [grid.line(row)]
+                found.append((grid.text(row, 0), "\n".join(texts), grid.sheet.name))
+    return [one for one in found if says_figures(one[1])]
 
 
 def _starts(texts: Iterable[str], sign: str) -> list[Floats]:
@@ -96,14 +117,25 @@ def _own(text: str, name: str, names: Collection[str]) -> list[str]:
     return lines
 
 
-def place_of_axis(axis: str, texts: Iterable[str], mm: float, sign: str) -> tuple[str, str] | None:
-    """Where a run along an axis lies, its scale at 0, in mm: where a text that names it gives both other coordinates."""
+def place_of_axis(
+    axis: str, texts: Iterable[str], mm: float, sign: str, targets: Sequence[float] = (0.0,)
+) -> tuple[str, str] | None:
+    """Where a run along an axis lies, its scale at 0, in mm: where a text that names it gives both other coordinates.
+
+    targets : from the lowest; a start that is said is that of the first, as a diagonal is of 0.
+    """
     found: dict[str, str] = {}
+    if axis not in AXES and not targets[0]:  # a diagonal, whose targets count from its start
+        own = [text for text in texts if says_figures(text)]
+        place = place_of_line([said_in(own, sign)], targets[-1], _NEAR_MM / mm) if own else ""
+        return (_in_mm(place, mm), "; ".join(own)[:_SHOWN]) if place and "?" not in place else None
     for text in texts:
         said = said_in([text], sign)
         named = hint(text, lengths=True) == LINE or {one[-1] for one in said.axes} == {axis}
-        if {*said.across} == {*"XYZ"} - {axis} and named and not said.odd:
-            place = f"along {axis} from {place_text(np.array([(said.across | {axis: 0.0})[one] for one in 'XYZ']))}"
+        known = said.across | said.start
+        if {*known} >= AXES - {axis} and named and not said.odd and not said.end:
+            known[axis] = known.get(axis, targets[0]) - targets[0]
+            place = f"along {axis} from {place_text(np.array([known[one] for one in 'XYZ']))}"
             found[_in_mm(place, mm)] = text
     return found.popitem() if len(found) == 1 else None
 
@@ -136,6 +168,6 @@ def proposed(place: str, words: str = "") -> tuple[str, str]:
     (('', 'along Y from 100,200,300'), 'along X from ?,800,400', 'from 100,200,300 to 500,600,700')
     """
     axes = {one[-1] for one in said_in([words]).axes}
-    axis = axes.pop() if len(axes) == 1 else "" if _DIAGONAL.search(words) else "X"
+    axis = axes.pop() if len(axes) == 1 else "" if DIAGONAL.search(words) else "X"
     example = f"along {axis} from 100,200,300" if axis else "from 100,200,300 to 500,600,700"
     return place if re.search(r"\d", place) else "", place.replace("?,?,?", "100,200,300") or example

@@ -11,7 +11,7 @@ import numpy as np
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import Block, CutSheet
 from cmm_uq.jobs.importing.coordinates import OF_CIRCLES
-from cmm_uq.jobs.importing.factors import RUN, hint, senses, way_of, ways_of
+from cmm_uq.jobs.importing.factors import RUN, hint, says_of, senses, way_of, ways_of
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, without_derived
 from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, settled_base
@@ -25,7 +25,8 @@ _OFF_MM = 1.0  # farther from its target no axis comes to rest
 
 def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
     """Deviations at targets of rows below one head: ``None`` where there are none, or no sense of travel is named."""
-    columns = [c for c in columns_in(grid, blocks, rows) if c.may_be_length]
+    every = columns_in(grid, blocks, rows)
+    columns = [c for c in every if c.may_be_length and not of_other_errors(c.path)]
     target = _target(columns) if len(columns) <= WIDEST else None
     if target is None or not np.isfinite(target.values[0]):
         return None
@@ -41,7 +42,9 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
     directed = [c for c in small if ways[c.i]] or [c for c in small if c.role == "deviation"]
     source = directed or small  # the others are reversals, spreads and what was recorded beside them
     source = sorted((c for own in families(source) if len(own) > 1 for c in own), key=lambda c: c.i) or source
+    source = [c for c in source if says_of(c.heading, "linear")] or source
     reading = SheetReading("runs", unit=target.unit, small=next((c.unit for c in source if c.unit), None))
+    reading.passed = [text for c in every if c not in columns for text in c.path]
     reached = _reached(columns, target, values)
     given = differences([filled, *reached], small)
     if given:
@@ -60,6 +63,11 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
             else:
                 reading.blank.append((row, c.i))
     return reading if senses(reading.every_label, [one[0] for one in reading.figures]) is not None else None
+
+
+def of_other_errors(path: Sequence[str]) -> bool:
+    """Whether a head says an angle, or how straight an axis is."""
+    return any(says_of(text) or says_of(text, "straight") for text in path)
 
 
 def _limit(column: FigureColumn, others: Sequence[FigureColumn], target: FigureColumn) -> bool:

@@ -1,0 +1,122 @@
+"""Runs along axes and diagonals, as a reading has them: which line each is of, its sense, its number, and its unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
+from cmm_uq.jobs.importing.factors import (
+    LINE,
+    RUN,
+    Label,
+    codes,
+    counted,
+    in_turn,
+    numbered_runs,
+    parts_of,
+    run_apart,
+    says_of,
+    senses,
+    together,
+)
+from cmm_uq.jobs.importing.format import UNITS, NotReadError, Sheet, length_named
+from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
+from cmm_uq.jobs.importing.lengths.placing import DIAGONAL
+from cmm_uq.jobs.importing.lines import AxisRun
+from cmm_uq.jobs.importing.roles import SheetReading
+
+_MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
+_FINEST_UM, _LEAST_UM = 0.002, 0.05  # finer and smaller than machines are known in µm: these are in the unit of targets
+
+
+def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
+    """Runs along axes, each with its targets in turn."""
+    figures, labels = np.array(reading.figures), reading.every_label
+    if (angle := _angle_in(reading, sheets)) is not None:
+        fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
+        raise NotReadError(f"its deviations may be angles ({angle!r})", where=where, fix=fix)
+    stated = reading.unit or unit_elsewhere(sheets, small=False)
+    unit = stated or UNITS["mm"]
+    small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
+    small = small or length_named(sheets[0].unit or "")
+    most, finest = np.abs(figures[:, 1]).max(), min(c.step for c in reading.taken["reading_um"])
+    if small is None and finest < _FINEST_UM and most < _LEAST_UM:
+        small = stated
+    if small is None and most < _MILLIMETRES:
+        fix = "Write it above them: (µm) or (mm)"
+        raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
+    target = units.converted(figures[:, 0], unit, "x_mm")
+    turn = not (reading.positions or reading.checked) and turned_by(
+        sheets, (c.heading for c in reading.taken["reading_um"]), where, targets=True
+    )
+    deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um") * (-1 if turn else 1)
+    named = [
+        [find(value) or find(f"{label.words} {value}") for value in label.values]
+        for find in (axis_in, letter_in)
+        for label in labels
+    ]
+    axes = next((own for own in named if all(own)), _lines_of(labels) or [_axis_of(sheets)] * len(target))
+    ways = senses(labels, target.tolist())
+    parts = [one for label in labels for one in (label, *run_apart(label, lengths=True), *parts_of(label))]
+    run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
+    key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
+    numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
+    if ways is None:  # by the order of their targets; none where all are listed in one order
+        ends = {n: target[numbers == n][[0, -1]] for n in np.unique(numbers).tolist()}
+        turns = {n: int(np.sign(last - first)) for n, (first, last) in ends.items()}
+        ways = [turns[n] if len({*turns.values()}) > 1 else 0 for n in numbers.tolist()]
+    counts = [re.findall(r"\d+", value) for value in run.values] if run is not None else []
+    if run is not None and {*map(len, counts)} == {1}:
+        each = [*zip((one[0] for one in counts), ways, strict=True)]
+        if len({*each}) == len({*run.values}):
+            numbers = np.array([int(one) for one, _ in each])  # ``Run 1 +`` and ``Run 1 -`` are one, there and back
+    runs: dict[tuple[str, int, int], AxisRun] = {}
+    rows = zip(target.tolist(), deviation.tolist(), reading.lines, strict=True)
+    for one, row in zip(zip(axes, ways, numbers.tolist(), strict=True), rows, strict=True):
+        runs.setdefault(one, AxisRun(*one, [])).targets.append(row)
+    if any(len({t for t, _, _ in run.targets}) < len(run.targets) for run in runs.values()):
+        raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
+    return list(runs.values())
+
+
+def _lines_of(labels: Sequence[Label]) -> list[str]:
+    """Names of lines that are no axes, as of diagonals; none where no label names them."""
+    several = (one for one in labels if len({*one.values}) > 1 and one.sort in ("title", "column", "sheet"))
+    lines = (one for one in several if counted(one, lengths=True) == LINE or all(map(DIAGONAL.search, one.values)))
+    return [value.split(":")[0].strip() for value in next((one.values for one in lines), ())]
+
+
+_AXES = "axis|achse|axe|asse|eje|eixo|osa|oś|axel|軸|轴|축"
+_AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES})", re.IGNORECASE)
+
+
+def _angle_in(reading: SheetReading, sheets: Sequence[Sheet]) -> str | None:
+    """A text that says that the deviations which are read are angles; of a whole file where nothing beside them denies it."""
+    heads = [text for c in reading.taken["reading_um"] for text in c.path]
+    told = any(says_of(text) for text in reading.passed)  # of others
+    labels = [one for one in reading.every_label if len({*one.values}) > 1 or not told]
+    own = [text for label in labels for text in dict.fromkeys(label.values)]
+    if reading.small is None and not reading.positions and not told:
+        own += [text for sheet in sheets for row in sheet.rows for text in row if isinstance(text, str)]
+    return next((text for text in dict.fromkeys([*heads, *own]) if says_of(text)), None)
+
+
+def axis_in(text: str) -> str:
+    found = _AXIS_NAME.search(text)
+    return (found[1] or found[2]).upper() if found else ""
+
+
+def letter_in(text: str) -> str:
+    """The one letter of an axis that stands alone in a text."""
+    found = {*re.findall(r"(?<![^\W_])[XYZ](?![^\W_])", text)}
+    return found.pop() if len(found) == 1 else ""
+
+
+def _axis_of(sheets: Sequence[Sheet]) -> str:
+    """The axis that the first texts of a file name."""
+    texts = (text for sheet in sheets for text in (sheet.name, *(" ".join(map(str, row)) for row in sheet.rows[:60])))
+    return next(filter(None, map(axis_in, texts)), "1")
