@@ -34,12 +34,13 @@ _LAST_SPACED = "\u2e7f"  # ahead of Chinese, Japanese and Korean characters
 NAME = "name"  # of the point or feature, by which it may be numbered; no column of a recording
 
 
-def plain_words(text: str) -> list[str]:
+@lru_cache(maxsize=4096)
+def plain_words(text: str) -> tuple[str, ...]:
     plain = text.casefold()
     if not plain.isascii():
         plain = unicodedata.normalize("NFKD", plain.translate(_SAME))
         plain = unicodedata.normalize("NFC", "".join(c for c in plain if not unicodedata.combining(c)))
-    return _WORDS.findall(plain)
+    return tuple(_WORDS.findall(plain))
 
 
 def unspaced(word: str) -> bool:

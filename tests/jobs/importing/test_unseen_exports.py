@@ -48,6 +48,7 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -139,14 +140,29 @@ def number(name: str) -> str:
     return re.split("[_.]", name)[0]
 
 
+@cache
+def without_keys(name: str) -> ImportedTable | CmmUqError:
+    """What is read, or asked, of a file of which nothing is said."""
+    try:
+        return read_export(EXPECTED[name].with_name(name))
+    except CmmUqError as asked:
+        return asked
+
+
+def read_with(name: str, keys: dict[str, Any]) -> ImportedTable:
+    found = read_export(EXPECTED[name].with_name(name), ImportKeys.model_validate(keys)) if keys else without_keys(name)
+    if isinstance(found, CmmUqError):
+        raise found
+    return found
+
+
 def answered(name: str) -> tuple[ImportedTable, list[Any]]:
     """A file read with every line along X from 0, and the lengths for which it was asked where they lie."""
-    path = EXPECTED[name].with_name(name)
     keys: dict[str, Any] = {"unit": ASKED[number(name)]} if number(name) in ASKED else {}
     lengths: list[Any] = []
     for _ in range(8):
         try:
-            return read_export(path, ImportKeys.model_validate(keys)), lengths
+            return read_with(name, keys), lengths
         except UnplacedError as asked:
             lengths = list(asked.lengths)
             lines = {line for one in asked.lengths for line in one.names}
@@ -185,7 +201,7 @@ def test_what_is_not_read_is_asked_about(name: str) -> None:
 def test_the_axis_of_runs_that_name_none_is_asked_for() -> None:
     (name,) = (name for name in EXPECTED if number(name) == NO_AXIS)
     with pytest.raises(CmmUqError, match="nothing says where line '1' lies"):
-        read_export(EXPECTED[name].with_name(name))
+        read_with(name, {})
 
 
 @pytest.mark.parametrize("name", [name for name in EXPECTED if number(name) not in {*REFUSED, NO_AXIS}])
@@ -251,7 +267,7 @@ def test_it_is_read_as_its_author_reads_it(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in EXPECTED if number(name) in ASKED])
 def test_what_no_figure_settles_is_asked(name: str) -> None:
     with pytest.raises(CmmUqError, match=f'Say unit = (.*or unit = )?"{ASKED[number(name)]}"'):
-        read_export(EXPECTED[name].with_name(name))
+        read_with(name, {})
 
 
 def columns_of(name: str, head: Sequence[str], lines: Sequence[int]) -> list[tuple[str, list[str]]]:
@@ -275,7 +291,7 @@ def test_every_column_is_in_the_reading_or_named_as_not_used() -> None:
     looked_at, silent = 0, []
     for name in DELIMITED:
         try:
-            found = read_export(EXPECTED[name].with_name(name), ImportKeys())
+            found = read_with(name, {})
             recognised, lines = found.recognised, [*map(int, found.lines)]
         except UnplacedError as asked:
             recognised, lines = asked.recognised, [line for one in asked.lengths for line in one.lines]

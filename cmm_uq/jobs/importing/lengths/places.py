@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from functools import cache
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -136,7 +136,7 @@ def without_place(text: str, sign: str) -> str:
 def said_in(texts: Iterable[str], sign: str = ".") -> Said:
     """What texts say of the place of one line."""
     said, texts = Said(), [*dict.fromkeys(texts)]
-    planes = set[str]().union(*map(_planes, texts))
+    planes = frozenset[str]().union(*map(_planes, texts))
     for text in texts:
         plain = unicodedata.normalize("NFKC", text).replace("−", "-")
         said.axes |= {f"+{one[1]}" for one in _PLUS_LENGTH.finditer(plain)}
@@ -183,10 +183,11 @@ def _planes(text: str) -> set[str]:
     return {"".join(sorted(letters)) for _, letters in _AXIS.findall(text) if len(letters) == 2}
 
 
-def _figures(text: str, sign: str, planes: Collection[str] = ()) -> list[Coordinates]:
+@lru_cache(maxsize=4096)
+def _figures(text: str, sign: str, planes: frozenset[str] = frozenset()) -> list[Coordinates]:
     """Coordinates in a text: three in brackets, behind the letters of all axes or behind a word; each behind its letter."""
     found: list[Coordinates] = []
-    planes = planes or _planes(text)
+    planes = planes or frozenset(_planes(text))
     for match in (match for pattern in _NAMED for match in pattern.finditer(text)):
         own = {axis: _value(one, sign) or 0.0 for axis, one in zip("XYZ", match.groups(), strict=True)}
         found.append((match.start(), match.end(), own, None))
