@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.app.api.outcomes import Report
-from cmm_uq.app.commands.diagnose import diagnosis_outcome
+from cmm_uq.app.commands.diagnose import diagnose_read, outcome_of as diagnosis_page
 from cmm_uq.app.commands.plan import plan_outcome
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.certificate.document import Block, Document, Table
 from cmm_uq.certificate.origin import as_json
-from cmm_uq.certificate.result import Outcome, Result
+from cmm_uq.certificate.result import AnalysisResult, Outcome, Result
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 
@@ -90,9 +90,14 @@ def results(job: str) -> dict[str, Any]:
     return found
 
 
+@cache
+def diagnosis_of(job: str) -> AnalysisResult:
+    return diagnose_read(job_read(job))
+
+
 @kept
 def diagnosed(job: str) -> Document:
-    return diagnosis_outcome(job_read(job)).document
+    return diagnosis_page(diagnosis_of(job)).document
 
 
 @kept

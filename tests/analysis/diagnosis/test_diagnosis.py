@@ -19,7 +19,6 @@ from benchmarks.told_nothing import case
 from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.held_out import improvement
-from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
@@ -30,6 +29,7 @@ from cmm_uq.jobs.recording.compared import against_earlier
 from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import indicated, plate
+from tests.artefacts.simulated import diagnosis_of
 from tests.conftest import ROOT
 from tests.machine.model.test_bending import LENGTH, recorded
 from tests.recordings import TRAVEL, bar_facts, bars, suggested, with_columns
@@ -86,7 +86,7 @@ def test_told_only_of_scale_the_real_recording_shows_its_squareness() -> None:
 
 
 def test_with_all_six_factors_the_real_recording_is_consistent() -> None:
-    found = diagnose_read(read_job(ROOT / "examples" / "iota-1102-20C")).diagnosis
+    found = diagnosis_of("iota-1102-20C").diagnosis
     assert found.verdict == "consistent"
     assert not found.effects
     assert not found.where

@@ -11,8 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from cmm_uq.app.cli.commands import app
+from cmm_uq.app.commands.jobs import compensate_poses
 from cmm_uq.app.commands.jobs.compensate_poses import write_corrected_poses
 from cmm_uq.base.errors import CmmUqError
+from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
 
 ROBOT = ROOT / "examples" / "robot-simulated"
@@ -25,7 +27,10 @@ def poses(folder: Path, *rows: str, head: str = HEAD + ",approach_q1") -> Path:
     return file
 
 
-def test_poses_are_written_with_places_uncertainties_and_corrected_readings(tmp_path: Path) -> None:
+def test_poses_are_written_with_places_uncertainties_and_corrected_readings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compensate_poses, "evaluate_job", lambda read, *, seed: analysed(read.facts.job.id))
     given = ["10,5,-5,30,40,20,1", "-40,-20,10,-60,-30,90,-1"]
     files, said = write_corrected_poses(ROBOT, poses(tmp_path, *given), tmp_path / "out")
     with files["poses-compensated.csv"].open(encoding="utf-8") as file:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -34,16 +33,17 @@ from cmm_uq.certificate.results.contents import next_data
 from cmm_uq.machine.physics.catalogue import EVERY, every
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.constructions import plate
-from tests.artefacts.simulated import diagnosed
+from tests.artefacts.simulated import diagnosed, diagnosis_of
 from tests.certificate.saying import leaves
 from tests.conftest import ROOT
 
 IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")  # words that no technician says
 
 
-@cache
 def recorded() -> JobDiagnosis:
-    return diagnose_read(read_job(ROOT / "examples" / "iota-1102-20C"))
+    found = diagnosis_of("iota-1102-20C")
+    assert isinstance(found, JobDiagnosis)
+    return found
 
 
 def consistent() -> JobDiagnosis:
