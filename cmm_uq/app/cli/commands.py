@@ -171,13 +171,11 @@ def run() -> int:
 
 
 def _called(first: list[str]) -> typer.Typer:
-    """The app with no command but the one that is called, so that only its options are made ready; else all of it."""
-    alone = [info for info in app.registered_commands if [info.name] == first]
-    if not alone:
-        return app
+    """The app with no command or group but the one that is called, so that only its options are made ready; else all of it."""
     called = copy(app)
-    called.registered_commands, called.registered_groups = alone, []
-    return called
+    called.registered_commands = [info for info in app.registered_commands if [info.name] == first]
+    called.registered_groups = [info for info in app.registered_groups if [info.name] == first]
+    return called if called.registered_commands or called.registered_groups else app
 
 
 def _misread(error: Any) -> CmmUqError:

@@ -68,6 +68,7 @@ def test_play_that_grows_across_is_told_as_a_function_of_the_sense_of_motion_and
     assert "function of direction of travel along X and Y" in str(one.why)
 
 
+@pytest.mark.long(but="False")
 @pytest.mark.parametrize(("shorter", "named"), [(0.0, True), (4.0, False)])
 def test_waves_that_grow_shorter_are_no_period(shorter: float, *, named: bool) -> None:
     random = np.random.default_rng(5)
@@ -99,6 +100,7 @@ def walk(seed: int, count: int) -> Floats:
     return np.cumsum(np.random.default_rng(seed).standard_normal(count))
 
 
+@pytest.mark.long(but="an hour")
 @pytest.mark.parametrize(
     ("of_hours", "said"),
     [
@@ -115,6 +117,7 @@ def test_a_drift_goes_on_evenly(of_hours: Callable[[Floats], Floats], said: set[
     assert named(search(own, 1.5e-3, alpha=0.01, seed=0)) == said
 
 
+@pytest.mark.long(but="75")
 @pytest.mark.parametrize(("width", "said"), [(75.0, {"wear_x_y"}), (30.0, set())])
 def test_wear_has_its_width(width: float, said: set[str]) -> None:
     """A twelfth of the travel of 900 mm."""
@@ -133,6 +136,7 @@ def test_what_else_is_unexplained_takes_no_effect_its_name() -> None:
     assert "drift_y" in named(found)
 
 
+@pytest.mark.long(but="none")
 @pytest.mark.parametrize(("axis", "form"), [(1, None), (2, "step")], ids=["a joint of the scale of Y", "none"])
 def test_a_form_is_named_that_is_no_effect(axis: int, form: str | None) -> None:
     """A step of Y along Y is as well two pieces of a scale that do not meet: the function lists its form alone."""
@@ -153,6 +157,7 @@ def test_what_is_withheld_so_is_modelled_as_a_function() -> None:
     assert found.improvement.heldout_rms_after_um <= found.improvement.heldout_rms_before_um
 
 
+@pytest.mark.long(but="1")
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_errors_that_only_others_of_their_kind_make_probable_are_not_named(seed: int) -> None:
     """Two squarenesses as 1 : 2 of a machine of which the job says nothing: four of the six are none."""

@@ -78,6 +78,7 @@ def test_location_tilt_and_eccentric_encoder_are_estimated(tmp_path: Path) -> No
         assert row["u"] < 0.1 * abs(true), name
 
 
+@pytest.mark.long(but="True")
 @pytest.mark.parametrize(("eccentric", "probable"), [(3.0, True), (0.0, False)])
 def test_a_concealed_eccentric_encoder_is_found_and_no_other_fault(
     tmp_path: Path, eccentric: float, *, probable: bool
