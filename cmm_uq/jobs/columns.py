@@ -7,8 +7,10 @@ the user knows keeps its name.
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from pathlib import Path
 from types import MappingProxyType
 
 from cmm_uq.base.files.csv_table import LARGEST, conversion
@@ -23,49 +25,11 @@ SENSORS = tuple(f"sensor_{a}_um" for a in AXES)
 REQUIRED = ("measurement", "point", *COORDINATES)
 WHOLE = ("measurement", "point", "repeat")
 
+_TABLE = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
 COLUMNS: Mapping[str, str] = MappingProxyType({
-    "measurement": "Number of the set-up: points of one measurement belong together.",
-    "point": "Number of the point in its measurement.",
-    "repeat": "1, 2, …: the same place measured again; 1 where the column is left out.",
-    "x_mm": "Indicated coordinate x; one number in all rows for an axis that nobody reads.",
-    "y_mm": "Indicated coordinate y, likewise.",
-    "z_mm": "Indicated coordinate z, likewise.",
-    "reference_mm": "Certified distance of this point from point 1 of its measurement.",
-    "reference_u_um": "Standard uncertainty of that distance by the certificate; of a plate, of each coordinate of the ball.",
-    "reference_U_um": "The same as expanded uncertainty, with `[artefact] k` or `degrees_of_freedom`.",
-    "reference_u_x_um": "Standard uncertainty of `reference_x_mm`, where the coordinates of a ball have different ones.",
-    "reference_u_y_um": "Standard uncertainty of `reference_y_mm`, likewise.",
-    "reference_u_z_um": "Standard uncertainty of `reference_z_mm`, likewise.",
-    **{f"reference_{a}_mm": f"Certified, or nominal, {a} of this ball or hole in the plate's own frame." for a in AXES},
-    **{f"approach_{a}": f"Direction of travel along {a} into the point: −1, 0 or +1." for a in AXES},
-    **{f"n{a}": f"Outward unit normal at the probed point, along {a}." for a in AXES},
-    "time_s": "Time since the start of the job, or by a clock that began more than 12 days before.",
-    **{f"temp_{a}_c": f"Temperature of the scale of {a}." for a in AXES},
-    "temp_artefact_c": "Temperature of the artefact, by which its length is corrected with cte_per_k.",
-    "temp_table_top_c": "Temperature of the table's top.",
-    "temp_table_bottom_c": "Temperature of the table's underside.",
-    "temp_bridge_top_c": "Temperature of the top of the bridge.",
-    "temp_bridge_bottom_c": "Temperature of the underside of the bridge.",
-    "temp_ram_front_c": "Temperature of the front of the ram.",
-    "temp_ram_back_c": "Temperature of the back of the ram.",
-    "temp_air_c": "Temperature of the air.",
-    "pressure_hpa": "Pressure of the air.",
-    "humidity_pct": "Relative humidity of the air.",
-    "speed_mm_s": "Scanning speed.",
-    "load_kg": "Mass at the end of the ram: head, stylus, or what it lifts.",
-    **{f"acceleration_{a}_m_s2": f"Acceleration of carriage {a} when the point was read." for a in AXES},
-    **{f"since_reversal_{a}_mm": f"Way of carriage {a} since it last turned round." for a in AXES},
-    "gamma_deg": "Turn of the digitizer about its own axis.",
-    "depth_mm": "Scan depth of the point, along the digitizer's line of sight.",
-    "turned_deg": "By how much a sphere was turned about Z, a ring about its axis, against its first set-up: its form shows.",
-    **{f"tip_{a}_mm": f"Offset of the stylus tip from the end of the ram, along {a}." for a in AXES},
-    **{f"{a}_deg": f"Reading of the rotary axis {a.upper()}, where the machine's chain has one." for a in ROTARY},
-    **{f"{a}_approach": f"How the rotary axis {a.upper()} turned into the point: −1, 0 or +1." for a in ROTARY},
-    **{f"sensor_{a}_um": f"Sphere in a nest of sensors, off the place that the machine went to, along {a} of the machine."
-       for a in AXES},
-    "radius_mm": "Radius of the fit that gave the point.",
-    "fit_rms_um": "Root mean square of the residuals of the fit that gave the point.",
-    "n_points": "Number of points of the fit that gave the point.",
+    name.format(axis=a, rotary=a): text.format(axis=a, rotary=a.upper())
+    for name, text in _TABLE.items()
+    for a in (ROTARY if "{rotary}" in name else AXES if "{axis}" in name else "_")
 })  # fmt: skip
 _OF_SOME_MACHINES = re.compile(
     r"temp_(bridge|ram)_.*|depth_mm|turned_deg|[abc]_deg|[abc]_approach|sensor_.*|load_kg|(acceleration|since_reversal)_.*"
@@ -75,19 +39,8 @@ OPTIONAL = tuple(name for name in COLUMNS if name not in REQUIRED and not _OF_SO
 AMBIENT = tuple(name for name in OPTIONAL if re.fullmatch(r"temp_\w+_c|pressure_hpa|humidity_pct", name))
 # what instruments read, which the kinds that go by it describe
 READINGS = (
-    *(
-        "reading_um",
-        "reading_mm",
-        "reading_arcsec",
-        "straightedge",
-        "square",
-        "face",
-        "face_arcsec",
-        "u_mm",
-        "v_mm",
-        "alpha_deg",
-        "beta_deg",
-    ),
+    *(f"reading_{name}" for name in ("um", "mm", "arcsec")),
+    *("straightedge", "square", "face", "face_arcsec", "u_mm", "v_mm", "alpha_deg", "beta_deg"),
     *(f"{name}_{a}" for name in ("read", "turn") for a in AXES),
 )
 LARGEST_NUMBER = 1e9  # of a measurement, point or repeat

@@ -28,6 +28,7 @@ DATED = re.compile(r"\d{4}[./-]\d{1,2}[./-]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,
 _PRINTED, _BRACKETS = re.compile(r"\d[.,]\d"), re.compile(r"\([^)]*\)")
 _FORMULA = re.compile(r"(?s)(?<=\S)(?<![XYZxyz])(?<![(\[ ,;]k)\s*[=＝](?=.*[^\W\d]).*")  # how a column was computed
 _LETTERED = re.compile(r"(?:\b[Xx] [Yy] [Zz]|\b[Ii] [Jj] [Kk])$")
+_WITH_VALUE = re.compile(r":\s*[-+]?\d+[.,]\d+\s*°")
 _SPREAD = re.compile(r"\d\s?[sσ]")  # above a column, and no figure
 _PAIRS = re.compile(r"\s+(?=[^\W\d_]+\.?\s*:\s)")  # between titles in one row, as ``Position : XY  Run : 1``
 DEEPEST = 4  # rows of a head
@@ -334,6 +335,7 @@ class CutSheet:
         for row in reversed(pending):
             filled = [k for k, cell in enumerate(self.sheet.rows[row]) if cell != ""]
             alone = len(filled) == 1 and (filled == [0] or ": " in self.text(row, filled[0]))
+            alone = alone or (len(filled) < 3 and _WITH_VALUE.search(self.line(row)) is not None)
             if not head and alone and len(numbers) > 1:  # a title below its head
                 if pending[-1] - row < _TITLES:
                     continue

@@ -181,6 +181,10 @@ class ExportTable:
                 text.append(i)
             else:
                 _refuse_another_length(sheet, self.header, i, needed, self.where)
+                if not any(map(str.isdigit, "".join(heads.text_of(row[k]) for k in needed))):
+                    raise NotReadError(
+                        "names columns of another table", where=sheet.at(self.where, i), fix="Export one table"
+                    )
                 if figures := figured(text):
                     raise CmmUqError("has no coordinates, and figures follow", where=sheet.at(self.where, figures[0]),
                                      fix="Remove the line, or complete it")  # fmt: skip

@@ -27,6 +27,7 @@ _RIGID_MM = 0.1
 _EVEN_MM = 0.2  # to which the points of a plate are evenly spaced
 _COMPARED = 5000  # points of which all places are compared; of more those that come again equally often
 _CROWDED, _NEARLY = 20, 0.98  # points at one place, from which on they are a scan; part of the places
+_MANY_ON_A_BALL = 50  # points of which some come to places of others, where scans cross
 _PROBED, _ROUND, _LARGEST_BALL_MM, _FORM_MM = 9, 0.1, 75.0, 0.02  # of a ball that was probed
 _ANGLE = re.compile(r"°(?!\s?[CF])|度|\bdeg\b")
 # what speaks for a way, the strongest first
@@ -89,6 +90,17 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     named = any(way.of is None and way.rank and way.at.max() + 1 < len(xyz) for way in ways)  # names that come again
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
+    names = (f for f in found if place.max() == 0 and f[1].max() + 1 == len(xyz) and f[0].sort == "column")
+    if any(
+        f[2] == LINE or not all(map(str.isdecimal, f[0].values))
+        for f in names
+        if f[2] != RUN and not factors.counting(f[0].values)
+    ):
+        return None  # as of styli, of which each came to one place
+    every_row = factors.together(0 * place, *(f[1] for f in found)).max() + 1 == len(xyz)
+    scanned = every_row and len(xyz) > _MANY_ON_A_BALL and 4 * (len(xyz) - place.max() - 1) < len(xyz)
+    if scanned and _on_a_ball(xyz):
+        return _told(Grouping(0.0, None, 0 * place, np.arange(len(xyz)), None), found, xyz, labels)
     if not found and place.max() + 1 == len(xyz) > _FEW and not any(way.rank for way in ways):
         return _told(Grouping(0.0, None, 0 * place, place, None), found, xyz, labels)  # a list, and nothing else
     if not plate and _copied(ways, xyz) and all(way.of is None or way.rank < _NAMED for way in ways):
@@ -324,7 +336,8 @@ def _told(way: Grouping, found: Sequence[Counted], xyz: Floats, labels: Sequence
         if pairs:
             (one, run), *_ = pairs
             named, measurement, at = ([*named, one[0].values], together(measurement, one[1]), together(one[1], at))
-    if (turn := next((f[0].words for f in (way.of, run) if f and _ANGLE.search(f[0].words)), None)) is not None:
+    turned = (f for f in (way.of, run, *(f for f in found if most > 1 and f[1].max() > _FEW)) if f)
+    if (turn := next((f[0].words for f in turned if _ANGLE.search(f[0].words)), None)) is not None:
         what = f"places come again at each {turn.strip()!r}, which may be of a table that turned"
         raise NotReadError(what, fix="Write a recording with it as c_deg: docs/reference/columns.md")
     first = np.unique(measurement, return_index=True)[1]

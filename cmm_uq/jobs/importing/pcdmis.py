@@ -29,6 +29,7 @@ _BELOW = {
 }
 _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+(?:(?:RFS|MMC|LMC)\s+)?[-+\d.]", re.IGNORECASE)
 _CONDITION = re.compile(r"^\s*[A-Z]+\s+(RFS|MMC|LMC)\s", re.IGNORECASE)
+_FEW = 10  # times as many lengths, beside which places are of something else
 _NUMBER = re.compile(r"(?<!\S)(?:[-+]?\d*[.,]?\d+|[-+]?\d+[^\s\d.,]{1,3}\d+'\d+(?:[.,]\d+)?\")(?!\S)")
 
 
@@ -65,6 +66,8 @@ class PcDmis(TextReport):
                 (sort, [*own, *cells], line) for (sort, cells, line), *own in zip(rows, *beside.values(), strict=True)
             ]
             headings = [*beside, *headings]
+        if places and _FEW * len(places) < len(distances := _lengths(found)):  # of a qualified probe, beside lengths
+            places, rows = [], distances
         if not places:
             rows, headings = _lengths(found), ["name", "nominal", "measured"]
         if not rows:

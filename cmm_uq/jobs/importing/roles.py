@@ -289,7 +289,19 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
             role = _ROLES.get(name, "summary" if name or role in claimed else role)
             unit = unit or (UNITS[name[-2:]] if name.startswith("deviation_") else None)
         found.append(FigureColumn(i, path, values, float(min(steps[np.isfinite(values)])), unit, role, name in _ROLES))
+    _deny_summaries(found)
     return found
+
+
+def _deny_summaries(columns: Sequence[FigureColumn]) -> None:
+    """Columns that are alike row by row and all called a summary, as by a word that is also one for a diameter, are none."""
+    fine = [c for c in columns if not c.minute and not c.counts and np.nanmedian(np.abs(c.values)) > 1]
+    for c in fine:
+        alike = [o for o in fine if like(c.values, o.values)]
+        if len(alike) > 1 and all(o.role == "summary" for o in alike):
+            for o in alike:
+                words = [" ".join(word for word in plain_words(t) if said(word) != "summary") for t in o.path]
+                o.role = said(*words)
 
 
 def said_by(name: str, columns: Sequence[FigureColumn], more: str) -> str:
@@ -314,15 +326,17 @@ def _beside(grid: CutSheet, rows: Sequence[int], used: set[int]) -> list[Labels]
     """Names and numbers that stand beside rows, and titles above them."""
     out: list[Labels] = [{} for _ in rows]
     paths = grid.block_of[rows[0]].paths
-    lined = False
+    lined = named = False
+    bare: dict[int, str] = {}
     for i in sorted({*range(len(paths))} - used):
         cells = [grid.text(row, i) for row in rows]
         said_to_be = grid.named(i, paths[i])
         name = "run" if said_to_be == "repeat" else said_to_be or heading(paths[i])
         of_line = hint(name, lengths=True) == "line"
-        if of_line and not cells[0] and (any(cells) or not lined):
-            out[0]["unnamed", grid.at(rows[0], i)] = name
-        lined |= of_line and bool(cells[0])
+        if of_line and not cells[0]:
+            bare[i] = name
+            lined |= any(cells)
+        named |= bool(cells[0]) and (of_line or (len({*cells}) > 1 and not all(map(str.isdecimal, cells))))
         finest = min((n[1] for n in (grid.figure(row, i) for row in rows) if n is not None), default=1.0)
         decimals = finest < (_NUMBERED if of_line else 1)
         if decimals or not cells[0] or any(DATED.search(cell) for cell in cells[:3]):
@@ -330,6 +344,7 @@ def _beside(grid: CutSheet, rows: Sequence[int], used: set[int]) -> list[Labels]
         last = ""
         for labels, cell in zip(out, cells, strict=True):
             labels["column", f"{i} {name}"] = last = cell or last
+    out[0] |= {("unnamed", grid.at(rows[0], i)): name for i, name in bare.items() if lined or not named}
     for labels, row in zip(out, rows, strict=True):
         block = grid.block_of[row]
         labels |= {("title", first): text for first, text in block.titles[row].items()}

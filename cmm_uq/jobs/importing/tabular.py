@@ -24,10 +24,11 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.csv_table import lines_within
 from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS, UNPACKED
 from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.values import replace
 from cmm_uq.jobs.importing.cells.encodings import HOSTILE_FIX, decoded, head_text, local
 from cmm_uq.jobs.importing.cells.fixed_columns import in_columns
 from cmm_uq.jobs.importing.format import DELIMITERS, Cell, Fact, Format, ImportKeys, Sheet
-from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, understood
+from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of, text_of, understood
 from cmm_uq.jobs.importing.reports import in_pairs
 from cmm_uq.jobs.importing.roles import said
 
@@ -37,6 +38,8 @@ _TITLES: dict[str, Text] = {
 }  # fmt: skip
 _LINES = re.compile(r"\s*[\r\n]\s*")  # of a heading in a cell
 _KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
+_NUMBER = re.compile(rb'\br="(\d+)"')
+_HIDDEN_ROW = re.compile(rb'<row\b(?=[^>]*\bhidden="(?:1|true)")[^>]*>')
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 Rows = tuple[list[list[Any]], list[int]]  # cells of every line, and their lines
 
@@ -219,7 +222,9 @@ class Excel(Format):
                 warnings.simplefilter("ignore")  # of styles and extensions, which are not looked at
                 book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
                 visible = (sheet for sheet in book.worksheets if sheet.sheet_state == "visible")
-                sheets = [_sheet(sheet.title, _excel_rows(sheet), where) for sheet in visible]
+                sheets = [
+                    _without_hidden(_sheet(sheet.title, _excel_rows(sheet), where), sheet, content) for sheet in visible
+                ]
                 book.close()
         except CmmUqError:
             raise
@@ -240,6 +245,22 @@ def _excel_rows(sheet: Any) -> Iterator[tuple[int, list[Cell]]]:
             yield line, cells
         elif line - last > _EMPTY_MOST:
             break
+
+
+def _without_hidden(sheet: Sheet, of: Any, content: bytes) -> Sheet:
+    """Without the rows that the workbook hides, as those of measurements that are void; each is told."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        hidden = {int(n) for tag in _HIDDEN_ROW.findall(archive.read(of._worksheet_path)) for n in _NUMBER.findall(tag)}
+    each = [*zip(sheet.rows, sheet.lines, strict=True)]
+    left = tuple(
+        f"{sheet.name} row {line}: {' '.join(map(text_of, row))[:40]!r}, hidden" for row, line in each if line in hidden
+    )
+    kept = [one for one in each if one[1] not in hidden]
+    return (
+        replace(sheet, rows=[row for row, _ in kept], lines=[line for _, line in kept], left_out=left)
+        if left
+        else sheet
+    )
 
 
 def _excel_cell(value: Any) -> Cell:

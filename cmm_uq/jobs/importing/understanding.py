@@ -100,7 +100,8 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     elsewhere = said_elsewhere(upright, chosen)
     _refuse_same_lines(chosen, where)
     apart = [(grid.sheet, reading) for reading, grid in found if all(grid is not other for _, other in chosen)]
-    without = [shown(sheet, reading.rows[0], "another table") for sheet, reading in apart]
+    without = [told for sheet in sheets for told in sheet.left_out]
+    without += [shown(sheet, reading.rows[0], "another table") for sheet, reading in apart]
     _take_results(found, chosen)
     for grid in {id(own): own for _, own in chosen}.values():
         if (told := left_out.rows_left_out([reading for reading, own in chosen if own is grid], grid)) is None:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+import io
 
+import numpy as np
+import pytest
+from openpyxl import Workbook
+
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, Recognition
 from cmm_uq.jobs.importing.recording import ImportedTable, imported
@@ -84,3 +89,53 @@ def test_a_head_that_comes_again_is_told() -> None:
 def test_a_heading_with_commas_is_one() -> None:
     unused = Fact("not_used", Verbatim(""), Verbatim("U, k = 2, T"), ("U, k = 2", "T"))
     assert Recognition("a", "text", Verbatim(""), (unused,), {}, 0).unused == ("U, k = 2", "T")
+
+
+def test_a_direction_of_approach_is_no_line() -> None:
+    rows = [f"1;{way};{t};{linear(t, 1, 1 if way == '+' else -1)}" for way in "+-" for t in TARGETS]
+    table = read(["Run;Direction;Target mm;Deviation um", *rows, "axis X, Y = 100, Z = -50"])
+    assert {*table.columns["measurement"]} == {1.0}
+    assert {*table.columns["approach_x"]} == {1.0, -1.0}
+
+
+def test_straightness_is_no_position() -> None:
+    rows = [
+        f"{t:.3f};" + ";".join(f"{(7 * k + 3 * run * run) % 11 / 10:.2f}" for run in range(4))
+        for k, t in enumerate(TARGETS)
+    ]
+    with pytest.raises(CmmUqError, match="straightness"):
+        read(
+            [
+                "Test title;Straightness vertical",
+                "Axis;Y",
+                "Error units;micrometres",
+                "Target;Run 1 (+);Run 1 (-)",
+                *rows,
+            ]
+        )
+
+
+def test_deviations_are_known_by_their_mean_whatever_they_are_called() -> None:
+    series = [[round(0.1 * k + 0.37 * s * (-1) ** s, 2) for s in range(4)] for k in range(5)]
+    rows = [
+        f"{k + 1};{100 * k + 40}.00{k}21;{';'.join(map(str, own))};{sum(own) / 4:.2f}" for k, own in enumerate(series)
+    ]
+    head = "ST;KALIBRIERWERT;H1;R1;H2;R2;MITTEL"
+    table = read(["Abweichungen in UM, Laengen in MM, from (0, 0, 0) to (500, 0, 0)", head, *rows])
+    x = table.columns["x_mm"].reshape(-1, 2)[:, 1] - table.columns["reference_mm"].reshape(-1, 2)[:, 1]
+    np.testing.assert_allclose(np.sort(1000 * x), np.sort(np.ravel(series)), atol=1e-6)
+
+
+def test_hidden_rows_of_a_workbook_are_left_out_by_name() -> None:
+    book = Workbook()
+    book.active.append(["Line", "Nominal (mm)", "Measured (mm)"])
+    for line, nominal, off in ((1, 100, 0.0012), (1, 200, 0.0181), (1, 200, 0.0013), (1, 300, -0.0004)):
+        book.active.append([line, nominal, nominal + off])
+    book.active.row_dimensions[3].hidden = True
+    out = io.BytesIO()
+    book.save(out)
+    keys = ImportKeys.model_validate({"lines": {"Sheet": "along X from 0,0,0"}})
+    table = imported(out.getvalue(), "a.xlsx", keys)
+    assert sorted({*table.columns["reference_mm"]}) == [0.0, 100.0, 200.0, 300.0]
+    assert len(table.lines) == 6
+    assert "hidden" in fact(table, "left_out")

@@ -17,6 +17,7 @@ from cmm_uq.jobs.importing.format import UNITS, Cell, NotReadError, Sources, sou
 from cmm_uq.jobs.importing.header import plain_words, words_of
 from cmm_uq.jobs.importing.roles import SheetReading, said
 
+_BRACKETS = re.compile(r"\([^)]*\)")
 _SEVERAL = re.compile(r"(?<![^\s])[+-]?\d+[.,]\d+\s+[+-]?\d+[.,]\d+(?!\S)")
 
 
@@ -76,7 +77,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
     texts = [row for row in range(min(taken), last) if grid.kinds[row] == "text" and not grid.place(row)]
     cells = (cell for row in (*taken, *texts) for cell in grid.sheet.rows[row])
-    if any(isinstance(cell, str) and _SEVERAL.search(cell) for cell in cells):
+    if any(isinstance(cell, str) and _SEVERAL.search(_BRACKETS.sub("", cell)) for cell in cells):
         return None  # cells that were not cut apart
     told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
     above = grid.sheet.rows[: min(taken)]  # of a table, and again above each further page of it

@@ -22,6 +22,7 @@ from cmm_uq.jobs.importing.factors import (
     says_of,
     senses,
     together,
+    ways_of,
 )
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, Sheet, length_named
 from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
@@ -38,7 +39,8 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     figures, labels = np.array(reading.figures), reading.every_label
     if (angle := _angle_in(reading, sheets)) is not None:
         fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
-        raise NotReadError(f"its deviations may be angles ({angle!r})", where=where, fix=fix)
+        of = "angles" if says_of(angle) else "of straightness, across the axis"
+        raise NotReadError(f"its deviations may be {of} ({angle!r})", where=where, fix=fix)
     stated = reading.unit or unit_elsewhere(sheets, small=False)
     unit = stated or UNITS["mm"]
     small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
@@ -86,6 +88,7 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
 def _lines_of(labels: Sequence[Label]) -> list[str]:
     """Names of lines that are no axes, as of diagonals; none where no label names them."""
     several = (one for one in labels if len({*one.values}) > 1 and one.sort in ("title", "column", "sheet"))
+    several = (one for one in several if ways_of(one.values) is None)
     lines = (one for one in several if counted(one, lengths=True) == LINE or all(map(DIAGONAL.search, one.values)))
     return [value.split(":")[0].strip() for value in next((one.values for one in lines), ())]
 
@@ -102,7 +105,8 @@ def _angle_in(reading: SheetReading, sheets: Sequence[Sheet]) -> str | None:
     own = [text for label in labels for text in dict.fromkeys(label.values)]
     if reading.small is None and not reading.positions and not told:
         own += [text for sheet in sheets for row in sheet.rows for text in row if isinstance(text, str)]
-    return next((text for text in dict.fromkeys([*heads, *own]) if says_of(text)), None)
+    every = dict.fromkeys([*heads, *own])
+    return next((text for text in every if says_of(text) or says_of(text, "straight")), None)
 
 
 def axis_in(text: str) -> str:

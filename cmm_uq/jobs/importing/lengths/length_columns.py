@@ -27,6 +27,7 @@ _LEAST = 2.0  # of a length without a reference, in the unit of the file
 WIDEST = 100  # columns of a table of lengths
 _WITHIN = re.compile(r"(?<![\d.,])\d+[.,]\d+(?![\d.,]*\d)")  # figures in texts
 _AXIS = re.compile(r"(?<![A-Za-zÀ-ɏ])[XYZ](?![A-Za-zÀ-ɏ])")
+_LEAST_ROWS = 4  # in which no column is the mean of others by chance
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
 _NAME = "Name the columns by what they are: nominal_mm, reference_mm, length_mm, deviation_um"
@@ -35,7 +36,8 @@ _NAME = "Name the columns by what they are: nominal_mm, reference_mm, length_mm,
 def lengths_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> SheetReading | None:
     """Lengths of rows below one head: ``None`` where there are none; what is left open is an error that asks."""
     for i, path in enumerate(blocks[0].paths if not grid.placed(rows) else ()):
-        if {*"XYZ"} <= {grid.text(row, i) for row in rows} and hint(heading(path), lengths=True) != "line":
+        texts = "".join(text if (text := grid.text(row, i)) in {*"XYZ"} else "." for row in rows)
+        if "XYZ" in texts and hint(heading(path), lengths=True) != "line":
             return None  # coordinates of a report, one a row
     columns = columns_in(grid, blocks, rows)
     if len(columns) > WIDEST:
@@ -175,6 +177,7 @@ def _lengths(
     deviations, checked, factor = base is not None and not source, 0, 0.0
     if base is not None and not source:
         source = _deviations(grid, rows, [c for c in columns if c not in group], small, base)
+        checked = int(bool(source) and source == summed_up([c for c in columns if c not in group]))
     elif base is not None:
         checked, factor = _checked(grid, rows, small, source, base)
     if not deviations:
@@ -188,7 +191,7 @@ def _lengths(
         known = (one for one in single if one is not None and abs(one.values[0] - mean) > 1.05 * one.step)
         base = base or _reference_in_head(grid, rows, source) or next(known, None)
     named = {c.unit.name for c in source if c.unit} if deviations else set()
-    source = source if side_by_side(source) else counted_heads(source)
+    source = source if side_by_side(source) or (deviations and checked) else counted_heads(source)
     if not source or len(named) > 1 or not _plain(columns, group, base, source, checked):
         return None
     units = [c.unit for c in (*(() if deviations else source), *([base] if base else [])) if c.unit and not c.minute]
@@ -231,6 +234,7 @@ def _plain(
         near = bool(np.nanmedian(source[0].values) >= _LEAST) and all(like(source[0].values, c.values) for c in source)
         return near and not others and all(c.is_length or c.role == "measured" for c in source)
     every = all(c.named for c in source) or (len(group) == 2 and base.role is not None)
+    every = every or (len(source) > 1 and all(c.minute for c in source) and side_by_side(source))
     return bool(checked) or (base.named and every)
 
 
@@ -253,6 +257,21 @@ def _from_one(texts: Sequence[str]) -> bool:
     return numbers <= {*range(1, len(numbers) + 1)}
 
 
+def summed_up(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
+    """Columns side by side of which a mean or a range follows, whatever their heads are."""
+    fine = [c for c in columns if c.full and c.step < 1]
+    for size in range(len(fine) - 1, 1, -1) if len(fine) and len(fine[0].values) >= _LEAST_ROWS else ():
+        for k in range(len(fine) - size):
+            own, after = fine[k : k + size], fine[k + size]
+            if (
+                own[-1].i - own[0].i == size - 1
+                and after.sums_up(own)
+                and not any(o.sums_up(own[:j]) for j, o in enumerate(own) if j > 1)
+            ):
+                return own
+    return []
+
+
 def counted_heads(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
     """Those of columns whose heads count them, as ``Run 1`` and ``Run 2``; none of the others, which nobody explains."""
     several = [c for own in families(columns) if len(own) > 1 for c in own]
@@ -271,6 +290,7 @@ def _deviations(
         what = f"{', '.join(repr(c.heading) for c in runs[:3])} may be lengths, or deviations in µm or mm"
         fix = said_by("deviation_um", runs, ", deviation_mm or length_mm")
         raise NotReadError(what, where=grid.at(rows[0]), fix=fix)
+    source = summed_up(others) or source
     source = source or ((parted if side_by_side(parted) else counted_heads(parted)) if base.role else [])
     source = without_derived(source) or source
     once = len(np.unique(base.values)) == len(base.values)

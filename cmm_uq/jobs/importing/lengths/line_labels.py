@@ -53,7 +53,7 @@ def lines_and_runs(
     line: list[Counted] = []
     called = [f for f in plain if f[2] == LINE]
     for one in sorted(called, key=lambda f: (several and fixes(f[1], reference), f[0].sort == "part", -f[1].max())):
-        if not line or not fixes(factors.together(*(f[1] for f in line)), one[1]):
+        if not line or not fixes(factors.together(reference, *(f[1] for f in line)), one[1]):
             line.append(one)
     lined = any(f[2] == LINE for f in found)
     line, run = _told_apart(reference, [f for f in plain if f[2] in (None, POINT)], line, run, place, lined=lined)

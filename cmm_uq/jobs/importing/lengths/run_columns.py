@@ -62,7 +62,14 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
                 reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
             else:
                 reading.blank.append((row, c.i))
-    return reading if senses(reading.every_label, [one[0] for one in reading.figures]) is not None else None
+    from_zero = (
+        len(reading.figures) > len(np.unique(values))
+        and (reading.positions or reading.checked)
+        and not values.min()
+        and values.max() > 10 * _OFF_MM
+    )  # as no lengths do
+    sensed = senses(reading.every_label, [one[0] for one in reading.figures]) is not None
+    return reading if sensed or from_zero else None
 
 
 def of_other_errors(path: Sequence[str]) -> bool:
