@@ -134,14 +134,14 @@ def left_out(item: pytest.Item) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what starts a browser, a server or a process, and begin with the files that take longest.
+    """Mark what starts a browser, a server or a process, where marks choose, and begin with the files that take longest.
 
     Files of a folder otherwise stay in their order, in every worker.
     """
     if config.getoption("quick"):
         config.hook.pytest_deselected(items=[item for item in items if left_out(item)])
         items[:] = [item for item in items if not left_out(item)]
-    for item in items:
+    for item in items if config.option.markexpr else ():
         if isinstance(item, pytest.Function):
             fixtures = [made[-1].func for made in item._fixtureinfo.name2fixturedefs.values()]
             named = {*item.fixturenames, *(name for each in (item.function, *fixtures) for name in names_in(each))}
