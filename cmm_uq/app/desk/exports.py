@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -58,6 +57,11 @@ def keys_of(data: Mapping[str, Any]) -> ImportKeys:
 
 def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     """The whole reading of an export, as a page shows it; what is wrong with it is part of it."""
+    return _read(path, keys)[0]
+
+
+def _read(path: str, keys: Mapping[str, Any]) -> tuple[dict[str, Any], Header | None]:
+    """With the head of the first table, where there is one."""
     name, content, said = Path(path).name, content_of(Path(path), TABLE_BYTES, "Drop it again"), keys_of(keys)
     stated = [[str.__str__(text) for text in one.row] for one in exchange.offered(Path(path), said)]
     found: dict[str, Any] = {"name": name, "command": command(name, said), "problem": None, "lines": {}, "facts": []}
@@ -77,7 +81,7 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
     try:
         sheets, tables = tables_in(content, name, said)
     except CmmUqError:  # it is told already why nothing is read
-        return found | {"sheets": [], "columns": [], "rows": [], "more": 0, "understood": False}
+        return found | {"sheets": [], "columns": [], "rows": [], "more": 0, "understood": False}, None
     if recognised is not None:
         found["facts"] = [
             [str.__str__(label), str.__str__(text)]
@@ -90,7 +94,7 @@ def read(path: str, keys: Mapping[str, Any]) -> dict[str, Any]:
             if fact.key == SAME_PLACE
         ]
     found["sheets"] = [sheet.name for sheet in sheets if sheet.name]
-    return found | _grid(sheets, tables)
+    return found | _grid(sheets, tables), tables[0][1] if tables else None
 
 
 def _grid(sheets: Sequence[Sheet], tables: Sequence[tuple[Sheet, Header]]) -> dict[str, Any]:
@@ -145,12 +149,9 @@ def _untaken(heading: str) -> str:
 def corrected(path: str, keys: Mapping[str, Any], chosen: Mapping[str, str], said: Mapping[str, Any]) -> dict[str, Any]:
     """Keys after a form was sent: ``chosen`` meaning of each column by its index, ``said``: other keys, empty where none."""
     before = keys_of(keys)
-    header = None
-    with suppress(CmmUqError):  # of a report that is no table
-        tables = tables_in(content_of(Path(path), TABLE_BYTES, "Drop it again"), Path(path).name, before)[1]
-        header = tables[0][1] if tables else None
+    page, header = _read(path, keys)
     taken = meanings(header) if header is not None else {}
-    shown = {i: _told(meaning) for i, (_, meaning) in enumerate(read(path, keys)["columns"])}
+    shown = {i: _told(meaning) for i, (_, meaning) in enumerate(page["columns"])}
     now = {**taken, **shown, **{int(i): _told(meaning) for i, meaning in chosen.items()}}
     changed = [i for i in map(int, chosen) if now[i] != shown.get(i, "")]
     columns: dict[str, Any] = dict(before.columns)
