@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from functools import lru_cache, partial
 from itertools import combinations
 
 import numpy as np
@@ -172,10 +172,10 @@ def rows_by(numbers: Ints) -> tuple[Ints, ...]:
     return Placings.of(numbers).rows
 
 
+@lru_cache(maxsize=16)
 def samples_of(count: int, size: int) -> Ints:
     """Rows of different points, the same for every recording of so many."""
-    random = np.random.default_rng(count)
-    return np.argsort(random.random((_SAMPLES, count)), axis=1)[:, :size]
+    return np.argsort(np.random.default_rng(count).random((_SAMPLES, count)), axis=1)[:, :size].copy()
 
 
 def _some(count: int) -> Ints:
