@@ -28,10 +28,8 @@ if TYPE_CHECKING:
 _MEASUREMENT = ("FeatureMeasurement", "FeatureActual")  # as QIF 3 and as QIF 2 call them
 PLACED = tuple(f"{sort}{one}" for sort in ("Sphere", "Point", "Circle") for one in _MEASUREMENT)
 _DEEPEST = 40  # records within records
-_HIDDEN, _WITHIN = (
-    ("script", "style"),
-    ("a", "b", "br", "em", "i", "small", "span", "strong", "sub", "sup"),
-)  # of a web page
+_HIDDEN = ("script", "style")  # of a web page, as those within a text
+_WITHIN = ("a", "b", "br", "em", "i", "small", "span", "strong", "sub", "sup")
 _EXPORT = "Export the table as CSV or .xlsx"
 
 

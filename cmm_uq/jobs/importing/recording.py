@@ -116,14 +116,10 @@ def _imported(
         if not keys.columns and wanted is POINTS and _lengths_at_places(sheet, header):
             what = "its rows are lengths, measured at planned places"
             raise NotReadError(what, where=sheet.at(where, header.row), fix="Name columns")
-        if (
-            not keys.columns
-            and len(header.columns.get("x_mm", ())) == 2
-            and {"reference", "measured"} <= {*map(said, head)}
-        ):
-            raise NotReadError(
-                "its rows are lengths with both ends", where=sheet.at(where, header.row), fix="Name columns"
-            )
+        two_ends = not keys.columns and len(header.columns.get("x_mm", ())) == 2
+        if two_ends and {"reference", "measured"} <= {*map(said, head)}:
+            what = "its rows are lengths with both ends"
+            raise NotReadError(what, where=sheet.at(where, header.row), fix="Name columns")
         return _points(sheet, header, keys, where, reach_mm, replace(recognised, head=head), points=wanted is POINTS)
     except NotReadError as error:
         problem = error

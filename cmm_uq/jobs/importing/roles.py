@@ -30,6 +30,9 @@ _OF_NAMES: Mapping[Role, str] = {
 _ROLES = {name: role for role, names in _OF_NAMES.items() for name in names.split()}
 _CLAIMS: Mapping[Role, tuple[Role, ...]] = {"reference": ("reference", "nominal", "target")}
 _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
+_RELATIVE = re.compile(
+    r"(?i)(?<![^\W_])ppm(?![^\W_])|[µμu]m ?/ ?m(?![^\W_])|мкм ?/ ?м(?![^\W_])"
+)  # to a length, and none itself
 _FURTHER = tuple(name for name in OPTIONAL if name != "repeat" and not name.startswith("reference"))
 _NUMBERED = 0.05  # lines may be 1.1 and 1.2, and are no finer figures
 _INFLECTED = 7  # letters of a word of which the last may be another
@@ -284,7 +287,8 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
         if not np.isfinite(values).any():
             continue
         role = said(*path) or ("measured" if any(hint(text, lengths=True) == "run" for text in path) else None)
-        unit, name = unit_of(path) or grid.unit_in(rows, i), grid.named(i, path)
+        relative = UNITS["ppm"] if any(map(_RELATIVE.search, path)) else None
+        unit, name = relative or unit_of(path) or grid.unit_in(rows, i), grid.named(i, path)
         if grid.keys:
             role = _ROLES.get(name, "summary" if name or role in claimed else role)
             unit = unit or (UNITS[name[-2:]] if name.startswith("deviation_") else None)

@@ -139,3 +139,9 @@ def test_hidden_rows_of_a_workbook_are_left_out_by_name() -> None:
     assert sorted({*table.columns["reference_mm"]}) == [0.0, 100.0, 200.0, 300.0]
     assert len(table.lines) == 6
     assert "hidden" in fact(table, "left_out")
+
+
+def test_errors_in_parts_of_a_length_are_no_lengths() -> None:
+    rows = [f"{axis};{n};{n / 7:.2f};{n / 9 - 1:.2f}" for axis in "XYZ" for n in (1, 2, 3, 4)]
+    with pytest.raises(CmmUqError):
+        read(["axis;nominal length/m;relative error/ppm run 1;relative error/ppm run 2", *rows])

@@ -7,23 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.jobs.importing import format as units
+from cmm_uq.jobs.importing import factors, format as units
 from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
-from cmm_uq.jobs.importing.factors import (
-    LINE,
-    RUN,
-    Label,
-    codes,
-    counted,
-    in_turn,
-    numbered_runs,
-    parts_of,
-    run_apart,
-    says_of,
-    senses,
-    together,
-    ways_of,
-)
+from cmm_uq.jobs.importing.factors import LINE, RUN, Label
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, Sheet, length_named
 from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
 from cmm_uq.jobs.importing.lengths.placing import DIAGONAL
@@ -39,7 +25,7 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     figures, labels = np.array(reading.figures), reading.every_label
     if (angle := _angle_in(reading, sheets)) is not None:
         fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
-        of = "angles" if says_of(angle) else "of straightness, across the axis"
+        of = "angles" if factors.says_of(angle) else "of straightness, across the axis"
         raise NotReadError(f"its deviations may be {of} ({angle!r})", where=where, fix=fix)
     stated = reading.unit or unit_elsewhere(sheets, small=False)
     unit = stated or UNITS["mm"]
@@ -62,11 +48,17 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
         for label in labels
     ]
     axes = next((own for own in named if all(own)), _lines_of(labels) or [_axis_of(sheets)] * len(target))
-    ways = senses(labels, target.tolist())
-    parts = [one for label in labels for one in (label, *run_apart(label, lengths=True), *parts_of(label))]
-    run = next((part for part in parts if counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
-    key = codes([*zip(axes, ways or [0] * len(target), strict=True)])
-    numbers = numbered_runs(run.values) if run is not None else in_turn(together(key, codes(target.tolist())))
+    ways = factors.senses(labels, target.tolist())
+    parts = [
+        one for label in labels for one in (label, *factors.run_apart(label, lengths=True), *factors.parts_of(label))
+    ]
+    run = next((part for part in parts if factors.counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
+    key = factors.codes([*zip(axes, ways or [0] * len(target), strict=True)])
+    numbers = (
+        factors.numbered_runs(run.values)
+        if run is not None
+        else factors.in_turn(factors.together(key, factors.codes(target.tolist())))
+    )
     if ways is None:  # by the order of their targets; none where all are listed in one order
         ends = {n: target[numbers == n][[0, -1]] for n in np.unique(numbers).tolist()}
         turns = {n: int(np.sign(last - first)) for n, (first, last) in ends.items()}
@@ -87,9 +79,11 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
 
 def _lines_of(labels: Sequence[Label]) -> list[str]:
     """Names of lines that are no axes, as of diagonals; none where no label names them."""
-    several = (one for one in labels if len({*one.values}) > 1 and one.sort in ("title", "column", "sheet"))
-    several = (one for one in several if ways_of(one.values) is None)
-    lines = (one for one in several if counted(one, lengths=True) == LINE or all(map(DIAGONAL.search, one.values)))
+    several = [
+        one for one in labels if one.sort in ("title", "column", "sheet") and factors.ways_of(one.values) is None
+    ]
+    several = [one for one in several if len({*one.values}) > 1 + (one.sort == "column")]
+    lines = (o for o in several if factors.counted(o, lengths=True) == LINE or all(map(DIAGONAL.search, o.values)))
     return [value.split(":")[0].strip() for value in next((one.values for one in lines), ())]
 
 
@@ -100,13 +94,13 @@ _AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES
 def _angle_in(reading: SheetReading, sheets: Sequence[Sheet]) -> str | None:
     """A text that says that the deviations which are read are angles; of a whole file where nothing beside them denies it."""
     heads = [text for c in reading.taken["reading_um"] for text in c.path]
-    told = any(says_of(text) for text in reading.passed)  # of others
+    told = any(factors.says_of(text) for text in reading.passed)  # of others
     labels = [one for one in reading.every_label if len({*one.values}) > 1 or not told]
     own = [text for label in labels for text in dict.fromkeys(label.values)]
     if reading.small is None and not reading.positions and not told:
         own += [text for sheet in sheets for row in sheet.rows for text in row if isinstance(text, str)]
     every = dict.fromkeys([*heads, *own])
-    return next((text for text in every if says_of(text) or says_of(text, "straight")), None)
+    return next((text for text in every if factors.says_of(text) or factors.says_of(text, "straight")), None)
 
 
 def axis_in(text: str) -> str:

@@ -79,7 +79,9 @@ def _sized(column: FigureColumn) -> bool:
     """Whether a column may hold lengths: not the count of something, nothing small, in a unit of lengths."""
     if column.role == "deviation" or not column.may_be_length or column.minute:
         return False
-    whole = column.role in BASES or (column.role is None and not column.counts)
+    whole = (column.role in BASES and (column.unit is not None or not column.counts)) or (
+        column.role is None and not column.counts
+    )
     positive = np.nanmin(column.values) >= (0 if column.role == "target" else 1e-9)
     return bool((column.step < 1 or whole) and positive and np.nanmedian(np.abs(column.values)) >= 0.5)
 
@@ -259,7 +261,7 @@ def _from_one(texts: Sequence[str]) -> bool:
 
 def summed_up(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
     """Columns side by side of which a mean or a range follows, whatever their heads are."""
-    fine = [c for c in columns if c.full and c.step < 1]
+    fine = [c for c in columns if c.full and c.step < 1 and c.may_be_length]
     for size in range(len(fine) - 1, 1, -1) if len(fine) and len(fine[0].values) >= _LEAST_ROWS else ():
         for k in range(len(fine) - size):
             own, after = fine[k : k + size], fine[k + size]

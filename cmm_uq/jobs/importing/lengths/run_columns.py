@@ -62,12 +62,9 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
                 reading.add(row, k, c, source, (float(values[k]), float(c.values[k])))
             else:
                 reading.blank.append((row, c.i))
-    from_zero = (
-        len(reading.figures) > len(np.unique(values))
-        and (reading.positions or reading.checked)
-        and not values.min()
-        and values.max() > 10 * _OFF_MM
-    )  # as no lengths do
+    often = np.unique([one[0] for one in reading.figures], return_counts=True)[1]
+    again = often.size > 0 and often[0] == often.max() > 1 and not values.min() and values.max() > 10 * _OFF_MM
+    from_zero = again and (reading.positions or reading.checked)  # as no lengths do
     sensed = senses(reading.every_label, [one[0] for one in reading.figures]) is not None
     return reading if sensed or from_zero else None
 
