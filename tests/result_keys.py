@@ -193,7 +193,7 @@ RESULTS: Mapping[str, str] = {
     "diagnosis.effects[].effect": "An effect that was left out.",
     "diagnosis.effects[].probability": "Its posterior probability.",
     "diagnosis.effects[].parameters.PARAMETER": "Quantity: a parameter of it.",
-    "diagnosis.effects[].group": "What these data cannot tell from it; below 0.8 it is named as one of these.",
+    "diagnosis.effects[].group": "What these data cannot tell from it; below 0.9 it is named as one of these.",
     "diagnosis.effects[].other_periods_mm[].KEY": "Further periods that fit, each with its interval and probability.",
     "diagnosis.effects[].periods_mm[].KEY": "All periods that fit, in place of a parameter, where none is settled.",
     "diagnosis.effects[].alternatives[].effects": "A set of effects that the readings alone do not tell from it.",

@@ -87,9 +87,7 @@ def _two_places(artefact: Artefact, what: Text, repeats: int, least: int, *, rec
     points, reach = artefact.points, _reach(artefact)[0]
     every = _groups(points, recorded=recorded, least=least).values()
     whole = [own for own in every if len(own if repeats == 1 else _turned(points, own)) >= repeats]
-    middles = [
-        np.mean([points.xyz[points.rows_of_groups[group]].mean(axis=0) for group in own], axis=0) for own in whole
-    ]
+    middles = [np.mean([points.xyz[points.rows_of_groups[g]].mean(axis=0) for g in own], axis=0) for own in whole]
     far = max((float(np.linalg.norm(a - b)) for a in middles for b in middles), default=0.0)
     return asked(what, 2, 2 if far >= _FAR * reach else min(len(whole), 1))
 

@@ -74,9 +74,7 @@ class OutsideReadings:
     def in_words(self, measurements: Sequence[int | None]) -> list[Text]:
         """Why readings of some measurements, or of all (``None``), were left out."""
         about = [f.why for f in self.findings if None in measurements or set(f.measurements) & set(measurements)]
-        words: list[Text] = [
-            say("Outside, and left out of the estimates alone: {why}.", why=why) for why in about[:_NAMED]
-        ]
+        words: list[Text] = [say("Outside, and left out of the estimates alone: {why}.", why=w) for w in about[:_NAMED]]
         if (more := len(about) - _NAMED) > 0:
             words.append(say("Outside, too, are the readings of {count} findings more.", count=more))
         return words

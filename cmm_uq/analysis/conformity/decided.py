@@ -299,17 +299,15 @@ def form_error(test: Test) -> Statement:
     u = float(np.hypot(probed.certified / MICROMETRE / 2, u_form_um))
     test.refuse_without_uncertainty(u, "form_um")
     if u > 0 and u_form_um:
-        remark = say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, and what its "
-                     "calibration leaves uncertain, {u:.2g} µm.", u=u)  # fmt: skip
+        text = say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, and what its "
+                   "calibration leaves uncertain, {u:.2g} µm.", u=u)  # fmt: skip
     elif u > 0:
-        remark = say(
-            "u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u
-        )
+        text = say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u)
     else:
         key = at_key("form_um")
-        remark = say("The test sphere is taken as perfectly round: its form deviation{key} is not given.", key=key)
+        text = say("The test sphere is taken as perfectly round: its form deviation{key} is not given.", key=key)
     budget = probing_test_uncertainty(probed.certified, u_form_um * MICROMETRE)
-    return _of_spheres(test, probed, say("probing form error"), probed.form, u, remark, budget, signed=False)
+    return _of_spheres(test, probed, say("probing form error"), probed.form, u, text, budget, signed=False)
 
 
 def size_error(test: Test) -> Statement:

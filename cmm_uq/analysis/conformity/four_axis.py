@@ -104,10 +104,8 @@ def _widest(read: Floats, turn: float) -> float:
 
 
 CHARACTERISTICS = tuple(
-    Characteristic(
-        name, name, partial(four_axis_error, figure=name), conditions, needs="u_repeat_um", lines=REPEAT_LINES
-    )
-    for name in _TITLES
+    Characteristic(one, one, partial(four_axis_error, figure=one), conditions, needs="u_repeat_um", lines=REPEAT_LINES)
+    for one in _TITLES
 )
 NAME = "ISO 10360-3:2000"
 CLAUSES = (

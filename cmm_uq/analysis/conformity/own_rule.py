@@ -200,10 +200,8 @@ def whole(asked: CompleteTest, artefact: Artefact) -> tuple[Condition, ...]:
     points = artefact.points
     observed, own = np.isin(np.arange(len(points)), artefact.rows), counting(points)
     runs: dict[int, list[int]] = {}
-    for group in np.unique(points.group[own]).tolist():
-        runs.setdefault(points.run_of(group)[0], []).append(
-            len(np.unique(points.point[observed & (points.group == group)]))
-        )
+    for g in np.unique(points.group[own]).tolist():
+        runs.setdefault(points.run_of(g)[0], []).append(len(np.unique(points.point[observed & (points.group == g)])))
     few = (
         min((len(each) for each in runs.values()), default=0),
         min((n for each in runs.values() for n in each), default=0),

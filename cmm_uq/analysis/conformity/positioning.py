@@ -132,9 +132,7 @@ def positioning(
     items = []
     for measurement, run in runs.items():
         figures, spread = run.figures(), uncertainty_of_figures(run, test.circumstances)
-        names = [
-            name for name in figures if name in (figure, figure.removesuffix("d")) or name in _BOTH.get(figure, ())
-        ]
+        names = [n for n in figures if n in (figure, figure.removesuffix("d")) or n in _BOTH.get(figure, ())]
         if not names or not run.both:
             needs = "both directions, twice" if figure in "AR" else "both directions"
             needs = f"{needs}, a full circle and u_bar_um in [artefact]" if figure in "DF" else needs

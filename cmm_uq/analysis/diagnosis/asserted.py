@@ -1,15 +1,14 @@
 """What is asserted of a recording: each effect with its size, its probability, and what could stand in its place.
 
-A name is for a technician who acts on it: four in five is asked of an effect, or of it with what the readings cannot tell from
-it. Its form is held against every function that an error could be (:mod:`~cmm_uq.analysis.diagnosis.empirical`): one that is
-more probable in its place, or that has odds of 20 : 1 beside it and is of the same covariate, says that it has another form.
-
 Some sets of effects no recording tells from one, whatever was known beforehand. On seven lines of a gauge a roll of X is −0.3
 of the squareness X–Y and −0.6 of Z–X, to the last digit: that one effect is more probable beforehand than two is no evidence.
 Sets of one, two and three others are compared with an effect by what the readings say alone: all are as large beforehand as
 each other in what they show. Up to 20 : 1 they are one class, where no number of repeats would part them, or what is known
 beforehand does not either. Of fifty effects some three imitate any weak one within its noise: that is chance, more readings
 end it, and it is no reason to doubt what is found.
+
+A name is for a technician who acts on it: nine in ten is asked of an effect, or of it with what the readings do not tell from
+it, and of its form among all that an error could be (:mod:`~cmm_uq.analysis.diagnosis.empirical.model`).
 """
 
 from __future__ import annotations
@@ -30,11 +29,9 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import (
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member, effect_of
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
-from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, FunctionTerm
-from cmm_uq.analysis.diagnosis.empirical.model import MOST, ODDS, of_effect
+from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, NAMED, ODDS, other_forms
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
@@ -46,7 +43,6 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 _MOST, _TRIED = 3, 60  # effects of a set; sets whose evidence is computed
 _ALLOWED = 3.0  # prior standard deviations that an effect of a set may have
 _SEEN = 1e-9  # part of an effect's length that the baseline must leave of it
-_ALIKE = 1e-3  # part of an effect's squared length that a set leaves of it, up to which no number of repeats parts them
 _DISTINCT = 1e-6  # part of a member's squared length that the others of a set must leave
 
 
@@ -81,7 +77,7 @@ def alternative_sets(
                 continue
             odds, after = float(np.exp(lost)), (chosen - own[0]) | own[1]
             beforehand = float(np.exp(np.clip(prior.log(chosen) - prior.log(after), -700, 700)))
-            if part <= _ALIKE or odds * beforehand <= ODDS or own[1] <= always:
+            if part <= ALIKE or odds * beforehand <= ODDS or own[1] <= always:
                 sets.append(own)
                 named, titles = tuple(names[i] for i in members), tuple(effect_of(every[i]).title for i in members)
                 found.append(AlternativeSet(tuple(names[i] for i in taken), named, titles, sizes, odds, beforehand))
@@ -197,7 +193,6 @@ def _evidence(comparison: CandidateComparison, given: Sequence[Version], sets: S
     return found
 
 
-NAMED = 0.8  # probability from which an effect is named, alone or as one of a group
 IMPROBABLE = say("it is too improbable to be named, alone or together with what the readings do not tell from it")
 UNSUPPORTED = say("others of its kind make it probable, and the readings alone do not speak for it by 20 to 1")
 _TOLD_APART = 0.95
@@ -214,7 +209,7 @@ class OmittedEffect:
     explained: float  # part of the misfit's sum of squares that it takes away
     together: float  # probability of it or one that these data cannot tell from it
     points_to: Text  # what a technician should look at
-    # what these data cannot tell from it; with a probability below 0.8 it is named as one of these
+    # what these data cannot tell from it; with a probability below 0.9 it is named as one of these
     group: tuple[Text, ...] = ()
     # other periods that fit, where it has one; all that fit, where none of them is settled
     modes: tuple[Mode, ...] = ()
@@ -235,12 +230,10 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
     for effect in (e for e in result.model.effects if e.name in result.effects):
         modes = period_modes(result, index[effect.name])
         known = not modes or jointly.period_settled(result, index[effect.name], modes)
-        probability, together, group = _probability(result, index[effect.name], known=known)
+        probability, together, group = probability_of(result, index[effect.name], known=known)
         stand_ins = tuple(one for one in sets if effect.name in one.instead_of)
         # that it is one effect and not two is no evidence: by the readings alone
-        fewer = [
-            1 / one.odds for one in stand_ins if len(one.effects) != len(one.instead_of) or {*one.effects} <= rigid
-        ]
+        fewer = [1 / s.odds for s in stand_ins if len(s.effects) != len(s.instead_of) or {*s.effects} <= rigid]
         by_readings = min(probability, together / (1 + sum(fewer))) if fewer else probability
         group = group if probability < NAMED else ()
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
@@ -255,11 +248,8 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
             turned = np.exp(1j * reported["phase_rad"])
             middle = float(np.angle(np.mean(turned)))
             reported["phase_rad"] = np.asarray(middle + np.angle(np.exp(1j * (reported["phase_rad"] - middle))))
-        parameters = {
-            name: Quantity.of_draws(values, units[name])
-            for name, values in reported.items()
-            if known or name not in {"phase_rad", *(shape.name for shape in effect.shape)}
-        }
+        open_ = set[str]() if known else {"phase_rad", *(shape.name for shape in effect.shape)}
+        parameters = {name: Quantity.of_draws(v, units[name]) for name, v in reported.items() if name not in open_}
         explained = max(share, 0.0) if total > 0 else 0.0
         listed.append(OmittedEffect(
             effect.name, effect.title, by_readings, parameters, explained, together, effect.points_to, group,
@@ -268,7 +258,7 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
-def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
+def probability_of(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
     """Of an effect by itself, and with all that could stand in its place; and the names of those."""
     combinations = result.combinations
     if combinations is None:
@@ -282,11 +272,19 @@ def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[floa
 
 
 def _as_well(result: SearchResult, index: int, others: Iterable[int]) -> Key:
-    """Of others, functions and the effects in whose favour the readings alone speak within 20 : 1 of one, all else kept."""
-    comparison, given = result.first.comparison, [v for v in result.versions if v.explanation != index]
-    least = comparison.beside(given, (index,))[index][0] - np.log(ODDS)
-    every = result.first.explanations
-    return frozenset(i for i in others if every[i].kind == UNKNOWN or comparison.beside(given, (i,))[i][0] >= least)
+    """Of others, functions and the effects in whose favour the readings alone speak within 20 : 1 of one, all else kept.
+
+    Of each in its own form: another form of it is no more it than one of this effect would be.
+    """
+    given, every = [v for v in result.versions if v.explanation != index], result.first.explanations
+    least = _in_own_form(result, given, index) - np.log(ODDS)
+    return frozenset(i for i in others if every[i].kind == UNKNOWN or _in_own_form(result, given, i) >= least)
+
+
+def _in_own_form(result: SearchResult, given: Sequence[Version], index: int) -> float:
+    member, log, weight = result.first.comparison.of_versions(index, given)
+    own = np.array([not result.first.explanations[index].members[m].rough for m in member], dtype=bool)
+    return float(np.logaddexp.reduce((log + weight)[own], initial=-np.inf))
 
 
 def _squares(linear: LinearModel, without: Sequence[int]) -> float:
@@ -311,41 +309,16 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
     """Effects that are not to be named; where there are none, whether a function is shown beside those that are."""
     gone = dict[int, WithheldEffect]()
     for i in result.chosen if result.combinations is not None else ():
-        if _probability(result, i, known=_known(result, i))[1] < NAMED:
+        if probability_of(result, i, known=_known(result, i))[1] < NAMED:
             gone[i] = withheld_effect(result, i, IMPROBABLE)
     data = FunctionFit.of(result, result.first.families) if result.chosen and not gone else None
     if data is None or not data.families or not data.degrees:
         return gone, False
-    beside, finer = list[FunctionTerm](), data.refined()
-    while len(beside) < MOST and finer.total - finer.nothing > np.log(ODDS):
-        beside.append(_likeliest(finer))
-        data = replace(finer.with_function(finer.versions(1)[0]), families=data.families)
-        finer = data.refined()
-    known, prior = result.first.explanations, log_prior(result.first.explanations) - np.log(SHARES[UNKNOWN])
-    for i in sorted(result.chosen):
-        effect = effect_of(known[i])
-        if effect.everywhere or not _known(result, i):  # a straight line has no other form
-            continue
-        without = replace(data, free=withhold(result, frozenset({i})).last.baseline)
-        shown = without.rest(known[i].members[0].columns / result.first.comparison.noise_scale[:, None])
-        # a product of which it is a part is no other form: what that has besides would show beside it
-        others = [f for f in data.families if f.form != PRODUCT or not _part(shown, without.rest(f.columns[:, 0]))]
-        without = replace(without, families=others).refined()
-        # how rare it is was counted where effects were compared
-        own, other_forms = prior[i] - np.log(known[i].weight) + of_effect(result, i, without)
-        of = {*effect.columns, *(one.of for one in effect.imitated_by)}
-        other = next((one for one in beside if of & set(one.of.split(","))), None)
-        if other is None and own < np.log(NAMED) + np.logaddexp.reduce([own, other_forms, without.total]):
-            other = _likeliest(without)
-        if other is not None:
-            why = say("the readings show another form: {function}", function=other.title)
-            gone[i] = withheld_effect(result, i, why)
-    return gone, bool(beside)
-
-
-def _part(columns: Floats, whole: Floats) -> bool:
-    left = columns - whole @ np.linalg.lstsq(whole, columns, rcond=None)[0]
-    return bool(np.sum(left**2) < _ALIKE * np.sum(columns**2))
+    others, beside = other_forms(result, data, [i for i in sorted(result.chosen) if _known(result, i)])
+    for i, other in others.items():
+        why = say("the readings show another form: {function}", function=other.title)
+        gone[i] = withheld_effect(result, i, why)
+    return gone, beside
 
 
 def least_supported(result: SearchResult) -> dict[int, WithheldEffect]:
@@ -369,7 +342,3 @@ def _known(result: SearchResult, index: int) -> bool:
     """Whether an effect has no period, or one that is settled; of others functions of the same reading are named with it."""
     modes = period_modes(result, index)
     return not modes or jointly.period_settled(result, index, modes)
-
-
-def _likeliest(data: FunctionFit) -> FunctionTerm:
-    return data.families[data.versions(1)[0].family].term

@@ -222,9 +222,7 @@ def diagnose(
     least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
     model = replace(model, least_noise=least) if least > model.least_noise else model
     some = model if observe is None else thin_out(model, observe, seed)
-    found, joint, withheld, beside = _asserted(
-        search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known
-    )
+    found, joint, withheld, also = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
     if found.effects and (gain.elpd_gain <= gain.elpd_gain_se or gain.worse):
         withheld = (*withheld, *jointly.withhold_unpredicted(found, gain.unseen))
@@ -236,7 +234,7 @@ def diagnose(
     rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
     repeats, wrong = against_repeats(found.model), first.p_value < alpha
     shared = repeats is not None and repeats.p_value < alpha
-    doubtful = found.unexplained > _UNKNOWN or shared or beside
+    doubtful = found.unexplained > _UNKNOWN or shared or also
     empirical = empirical_model(found) if wrong and (doubtful or not found.effects) else None
     modelled = empirical is not None and empirical.predicts
     verdict = "undetermined" if shared else "consistent"

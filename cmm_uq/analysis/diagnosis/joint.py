@@ -135,11 +135,8 @@ def finer(likely: Floats, step: float, low: float, high: float) -> Floats:
     fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER
     found = np.unique(np.clip(fine, low, high))
     if len(found) == 1:  # all beyond one end
-        found = (
-            np.linspace(low, high, 2)
-            if high - low < step
-            else found + step / _FINER * np.array([0, 1 - 2 * (found[0] == high)])
-        )
+        within = found + step / _FINER * np.array([0, 1 - 2 * (found[0] == high)])
+        found = np.linspace(low, high, 2) if high - low < step else within
     return np.sort(found)
 
 

@@ -93,9 +93,7 @@ class Visibility:
             columns = linear.reduced.design[:, free]
             sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
             parts = np.linalg.lstsq(columns / sizes, left / rest, rcond=_RIDGE**0.5)[0]
-            names = [
-                linear.unknowns[i].key[0] for i, part in zip(free, parts, strict=True) if abs(part) > _PART
-            ] + names
+            names = [linear.unknowns[i].key[0] for i, p in zip(free, parts, strict=True) if abs(p) > _PART] + names
         return tuple(dict.fromkeys(names))
 
     def lengths(self, columns: Floats) -> Floats:
@@ -250,11 +248,8 @@ class SmallestEffect:
 def smallest_effects(result: SearchResult, alpha: float, model: RecordingModel) -> tuple[SmallestEffect, ...]:
     """The smallest amplitude of each effect that a recording would have shown; those that it could least come first."""
     view, named = Visibility.of(result), {effect.name for effect in model.effects}
-    listed = [
-        (i, explanation, effect)
-        for i, explanation in enumerate(view.explanations)
-        if (effect := explanation.effect) is not None and not effect.of_artefact and explanation.name not in named
-    ]
+    unnamed = ((i, one, one.effect) for i, one in enumerate(view.explanations) if one.name not in named)
+    listed = [(i, one, effect) for i, one, effect in unnamed if effect is not None and not effect.of_artefact]
     signals = _signals(view, listed)
     visible = [signal for signal in signals if signal.unit_length * ALLOWED > _FAINT]
     which, columns = [s.index for s in visible], np.array([s.column / s.unit_length for s in visible])
@@ -335,10 +330,8 @@ def _signals(view: Visibility, listed: Sequence[tuple[int, Explanation, Effect]]
     lefts = view.rest(raws)
     lefts = np.where(np.linalg.norm(lefts, axis=0) > ABSORBED * np.linalg.norm(raws, axis=0), lefts, 0.0)
     found = [
-        _Signal(i, effect, raw, left, length, none, none, none, none > 0)
-        for (i, _, effect), raw, left, length in zip(
-            straight, raws.T, lefts.T, view.lengths(lefts).tolist(), strict=True
-        )
+        _Signal(i, effect, raw, left, size, none, none, none, none > 0)
+        for (i, _, effect), raw, left, size in zip(straight, raws.T, lefts.T, view.lengths(lefts).tolist(), strict=True)
     ]
     return found + [_Signal.shaped(view, *row) for row in listed if row[1].shaped]
 

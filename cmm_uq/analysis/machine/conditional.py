@@ -63,9 +63,7 @@ class RecordedField:
         recordings of the machine. ``in_doubt``: (m, c) of the calibration's observations for what is stated to be in doubt.
         """
         models = (model, *(one.model for one in beside))
-        which = tuple(
-            i for i, one in enumerate(further) if any(recordings.recorded(each, one.effect) for each in models)
-        )
+        which = tuple(i for i, one in enumerate(further) if any(recordings.recorded(m, one.effect) for m in models))
         # where the artefact stands, not what was read: noise of readings would explain itself
         points = [each.artefact.points.at(each.where(each.estimate().about)) for each in models]
         errors = [_errors(models, further[i].effect, points, learned) for i in which]
@@ -301,11 +299,7 @@ def as_recorded_allows(
         every |= {one.stated_by for one in chains}
         chains = [one.unstated for one in chains if one.unstated]
     while True:
-        told = {
-            one.stated_by
-            for one in held
-            if one.unstated and any(recordings.recorded(each, one.effect) for each in models)
-        }
+        told = {s.stated_by for s in held if s.unstated and any(recordings.recorded(m, s.effect) for m in models)}
         left = sorted(name for name in told if not (name in found and found[name].denied))
         if not left:
             break

@@ -201,9 +201,7 @@ def contributions(model: RecordingModel, values: Floats) -> tuple[Contribution, 
     parts = linear.reduce(linear.design * apart)
     left = linear.reduce((linear.observed - linear.design @ values)[:, None])[:, 0]
     owners = [unknown.key[0] for unknown in linear.unknowns]
-    each: dict[str | None, Floats] = {
-        owner: parts[:, [one == owner for one in owners]].sum(axis=1) for owner in dict.fromkeys(owners)
-    }
+    each: dict[str | None, Floats] = {o: parts[:, [s == o for s in owners]].sum(axis=1) for o in dict.fromkeys(owners)}
     each[None] = left
     whole = np.sum(list(each.values()), axis=0)
     square = float(whole @ whole) or 1.0

@@ -308,9 +308,7 @@ def filling(machine: Machine, ends: Ends = ((0.0, 1.0),) * 3) -> Floats:
     parts = (np.arange(_EACH) + 0.5) / _EACH
     shares = [a + (b - a) * parts for a, b in ends]
     travels = [machine.travel(axis) for axis in AXES]
-    return np.array(
-        list(product(*(low + (high - low) * one for (low, high), one in zip(travels, shares, strict=True))))
-    )
+    return np.array(list(product(*(low + (high - low) * s for (low, high), s in zip(travels, shares, strict=True)))))
 
 
 def _moved(machine: Machine, named: Sequence[Effect], others: Sequence[Effect], regions: Sequence[Ends]) -> Floats:
@@ -336,7 +334,5 @@ def _moved(machine: Machine, named: Sequence[Effect], others: Sequence[Effect], 
     inverse = np.linalg.pinv(design / length[:, None], rcond=_RANK)[:, :k] / length[:, :k, None]
     told = np.abs(inverse @ design - np.eye(k, design.shape[2]))
     moving = [columns(one) for one in others]
-    found = np.array(
-        [np.hstack([one[:, :0], one @ np.hstack([seen[i] for seen in moving])]) for i, one in enumerate(inverse)]
-    )
+    found = np.array([np.hstack([m[:, :0], m @ np.hstack([s[i] for s in moving])]) for i, m in enumerate(inverse)])
     return np.where(np.any(told * length[:, :k, None] > _ANOTHER * length[:, None], axis=2)[..., None], np.nan, found)

@@ -48,9 +48,7 @@ def rotary_correction(
     errors, draws, drawn = errors_given(model, doubt, observe, seed)
     about = About(_anywhere(model.artefact.points, seed))
     at = np.concatenate([about.columns(effect) for effect in errors.effects], axis=2).reshape(-1, draws.shape[1])
-    before, after = (
-        float(np.sqrt(np.mean((each @ at.T) ** 2)) / MICROMETRE) for each in (draws, draws - errors.values)
-    )
+    before, after = (float(np.sqrt(np.mean((e @ at.T) ** 2)) / MICROMETRE) for e in (draws, draws - errors.values))
     agreement = drawn.agreement(drawn.of_recording(model, posterior), posterior, doubt, None)
     return RotaryCorrection(errors, tuple(_omitted(model)), (before, after), agreement, _held_out(drawn, seed))
 

@@ -186,10 +186,8 @@ class Evaluator:
         found = np.zeros((_count(coefficients), len(normals)), dtype=HEIGHTS)
         pairs = enumerate(zip(self.causes, coefficients, strict=True))
         acting = [(k, one, np.asarray(drawn)) for k, (one, drawn) in pairs if one is not None and drawn is not None]
-        if common := [
-            (k, one, drawn) for k, one, drawn in acting if isinstance(one, CommonCause)
-        ]:  # all in one product
-            key = name, tuple(k for k, *_ in common)
+        if common := [(k, c, drawn) for k, c, drawn in acting if isinstance(c, CommonCause)]:
+            key = name, tuple(k for k, *_ in common)  # all in one product
             if key not in self._raising:
                 lefts, rights = zip(*(one.raising(rows, normals) for _, one, _ in common), strict=True)
                 self._raising[key] = lefts, np.concatenate(rights)

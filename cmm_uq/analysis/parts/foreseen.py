@@ -117,9 +117,7 @@ def foreseen_ratios(
     def errors(conditions: MeasurementConditions, of: Ints) -> Floats:
         """(N, c) of these draws of the machine, and of the same of all other causes each time."""
         place = AtPose(plan, conditions, conditions.poses[0], virtual.known)
-        drawn: list[Drawn] = [
-            cause.draw(np.random.default_rng([seed, i]), len(of)) for i, cause in enumerate(place.causes)
-        ]
+        drawn: list[Drawn] = [c.draw(np.random.default_rng([seed, i]), len(of)) for i, c in enumerate(place.causes)]
         machine = conditions.machine
         drawn[0] = Rows(machine.draws, machine.mean, of)
         if machine.drift.any():

@@ -33,9 +33,7 @@ _SIDEWAYS = 1e-6  # component of a normal below which an axis does not move into
 
 
 # columns that follow from how a point is probed
-OWN_COLUMNS = tuple(
-    f"{begin}{axis}{end}" for begin, end in (("n", ""), ("tip_", "_mm"), ("approach_", "")) for axis in AXES
-)
+OWN_COLUMNS = tuple(f"{begin}{a}{end}" for begin, end in (("n", ""), ("tip_", "_mm"), ("approach_", "")) for a in AXES)
 
 
 @dataclass(frozen=True, eq=False)

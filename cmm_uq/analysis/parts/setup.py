@@ -34,9 +34,7 @@ PLACES = 16  # places of the part that are drawn where it does not lie in the sa
 def plan_of(job: PartJob) -> Plan:
     """The plan of a job that was read: geometry alone, in mm and rad, in the frame of the part."""
     facts = job.facts
-    features = tuple(
-        _feature(one, facts.stylus_of(one.facts).name, one.facts.form or facts.form) for one in job.features
-    )
+    features = tuple(_feature(f, facts.stylus_of(f.facts).name, f.facts.form or facts.form) for f in job.features)
     names = [one.name for one in features]
     ends = np.cumsum([0, *(len(one.points) for one in features)])
     order = [names.index(name) for name in facts.probing.order] or list(range(len(names)))

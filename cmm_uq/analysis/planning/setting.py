@@ -290,9 +290,7 @@ class Planning:
     # further set-ups, at which a plan says how well it predicts
     held_out: Callable[[Setting], tuple[SetUp, ...]] | None = None
     notes: Callable[[Setting], tuple[Text, ...]] | None = None  # what of set-ups is not looked at
-    pictures: Callable[[Setting, Sequence[SetUp]], Sequence[Any]] | None = (
-        None  # plots of them, in place of the usual ones
-    )
+    pictures: Callable[[Setting, Sequence[SetUp]], Sequence[Any]] | None = None  # of them, in place of the usual
 
 
 @dataclass(frozen=True, eq=False)

@@ -209,11 +209,8 @@ def _hint(points: Points, axis: int) -> Text:
     hints = [say("a missing origin_mm")]
     if inside(origin[axis] - points.xyz[:, axis]):
         hints.append(say("{column} with the wrong sign", column=own))
-    hints += [
-        say("{column} exchanged with {other}", column=own, other=Verbatim(COORDINATES[j]))
-        for j in range(3)
-        if j != axis and inside(origin[axis] + points.xyz[:, j])
-    ]
+    others = [COORDINATES[j] for j in range(3) if j != axis and inside(origin[axis] + points.xyz[:, j])]
+    hints += [say("{column} exchanged with {other}", column=own, other=Verbatim(other)) for other in others]
     return say(": look for {hints}", hints=comma_or(hints))
 
 

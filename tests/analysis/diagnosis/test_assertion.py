@@ -195,9 +195,9 @@ def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypat
     assert "does not predict set-ups that the fit had not seen" in withheld.why
 
 
-@pytest.mark.parametrize(("probability", "named"), [(0.37, True), (0.72, True), (0.83, False)])
+@pytest.mark.parametrize(("probability", "named"), [(0.37, True), (0.72, True), (0.93, False)])
 def test_an_effect_that_is_named_by_its_group_is_named_with_it(probability: float, named: bool) -> None:
-    """From 0.8 on it is named by itself."""
+    """From 0.9 on it is named by itself."""
     size = Quantity(12.0, 1.7, (8.6, 15.4), unit("µm"))
     gain = Improvement(4.0, 1.0, 4.0, 1.0, 9.0, 1.0)
     item = OmittedEffect(

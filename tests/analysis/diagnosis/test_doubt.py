@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.asserted import NAMED, doubted, least_supported
+from cmm_uq.analysis.diagnosis.asserted import doubted, least_supported
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, withhold
 from cmm_uq.analysis.diagnosis.diagnosis import diagnose
-from cmm_uq.analysis.diagnosis.empirical.model import empirical_model
+from cmm_uq.analysis.diagnosis.empirical.model import NAMED, empirical_model
 from cmm_uq.analysis.diagnosis.joint import WithheldEffect
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
@@ -176,3 +176,47 @@ def test_errors_that_only_others_of_their_kind_make_probable_are_not_named(seed:
         assert one.probability <= 20 / 21 < 1
         assert one.probability < probable.of(i)
         assert "20 to 1" in str(one.why)
+
+
+def test_a_hill_over_two_readings_is_no_wear() -> None:
+    """Of one reading, or twice: it is a function of both."""
+    place = (450.0, 300.0)
+
+    def hill(points: Points) -> Floats:
+        away = (points.xyz[:, :2] - place) / (900.0, 600.0)
+        return 14 * np.exp(-0.5 * np.sum(away**2, axis=1) / 0.15**2)
+
+    found = search(shifted(np.random.default_rng(16), 2, hill), 1.5e-3, alpha=0.01, seed=0)
+    assert not {name for name in named(found) if name.startswith(("wear", "straightness"))}
+    told = empirical_model(withhold(found, found.chosen))
+    assert told is not None
+    assert (told.functions[0].term.of, told.functions[0].form) == ("x_mm,y_mm", None)
+
+
+def test_what_turns_as_it_warms_is_a_product() -> None:
+    random = np.random.default_rng(17)
+    once = bars(random, 100, 400.0, Machine("m", "XYZ", TRAVEL))
+    warm = random.uniform(19.0, 22.0, len(once))
+    error = 8e-3 * (once.xyz[:, 1] / 300 - 1) * (warm - 20.5) / 1.5
+    noise = 1.5e-3 * random.standard_normal(once.xyz.shape)
+    own = model(with_columns(once, temp_x_c=warm).at(once.xyz - error[:, None] * [0, 0, 1] + noise))
+    found = search(own, 1.5e-3, alpha=0.01, seed=0)
+    told = empirical_model(withhold(found, found.chosen))
+    assert told is not None
+    assert told.functions[0].form is not None
+    assert (told.functions[0].term.of, told.functions[0].form.name) == ("temp_x_c,y_mm", "product")
+
+
+def test_a_form_beside_which_something_is_left_is_not_named() -> None:
+    """A step with ripples: a step is most probable by far, and not what lies along X."""
+
+    def both(points: Points) -> Floats:
+        x = points.xyz[:, 0]
+        return np.where(x > 450, 20.0, 0.0) + 3.5 * np.sin(2 * np.pi * x / 60)
+
+    found = search(shifted(np.random.default_rng(18), 2, both), 1.5e-3, alpha=0.01, seed=0)
+    told = empirical_model(withhold(found, found.chosen))
+    assert told is not None
+    first = told.functions[0]
+    assert (first.term.of, first.forms[0][0], first.form) == ("x_mm", "step", None)
+    assert first.forms[0][1] > 0.95

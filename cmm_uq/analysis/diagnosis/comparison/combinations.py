@@ -230,11 +230,8 @@ def explore(
 
 def effects_of_every_machine(comparison: CandidateComparison) -> list[int]:
     """Effects that every machine has to some degree and this recording shows."""
-    return [
-        i
-        for i in sorted(comparison.visible)
-        if (effect := comparison.explanations[i].effect) is not None and effect.everywhere and not effect.of_artefact
-    ]
+    effects = ((i, comparison.explanations[i].effect) for i in sorted(comparison.visible))
+    return [i for i, effect in effects if effect is not None and effect.everywhere and not effect.of_artefact]
 
 
 def _explored(

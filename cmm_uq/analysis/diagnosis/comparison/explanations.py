@@ -247,7 +247,7 @@ def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Itera
 def _of_place(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
     if np.sum(np.ptp(points.machine_xyz, axis=0) > 1.0) < 2:
         return
-    factors = list(_smooth_in_space(points.machine_xyz))
+    factors = list(smooth_in_space(points.machine_xyz))
     for j, direction in enumerate(AXES):
         members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
         name = say("error along {direction} as a function of the place", direction=Verbatim(direction.upper()))
@@ -285,7 +285,7 @@ def _of_direction(model: RecordingModel) -> Iterator[Explanation]:
     among = directions(model)
     if len(np.unique(np.round(among, 3), axis=0)) < _MANY_DIRECTIONS:
         return
-    members = tuple(Member(factor) for factor in _smooth_in_space(among, _DIRECTION_LENGTHS))
+    members = tuple(Member(factor) for factor in smooth_in_space(among, _DIRECTION_LENGTHS))
     yield Explanation(say("error as a function of the probing direction"), UNKNOWN, members)
     azimuth = np.arctan2(among[:, 1], among[:, 0])
     waves = [UNKNOWN_SD * np.column_stack([np.cos(k * azimuth), np.sin(k * azimuth)]) for k in _LOBES]
@@ -376,8 +376,8 @@ def smooth_functions(covariate: Floats) -> Iterator[Floats]:
         yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
 
 
-def _smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGTHS) -> Iterator[Floats]:
-    """Factors (n, r), mm, of squared-exponential covariances over readings (n, 3) (Nyström on some of their places)."""
+def smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGTHS) -> Iterator[Floats]:
+    """Factors (n, r), mm, of squared-exponential covariances over readings (n, d) (Nyström on some of their places)."""
     place = (readings - readings.min(axis=0)) / float(np.ptp(readings, axis=0).max())
     distinct = np.unique(np.round(place, 6), axis=0)
     some = distinct[np.unique(np.linspace(0, len(distinct) - 1, _SPACE_PLACES).round().astype(int))]

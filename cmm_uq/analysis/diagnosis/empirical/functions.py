@@ -6,16 +6,18 @@ about the most probable nodes it is divided.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import product
 
 import numpy as np
 
+from cmm_uq.analysis.diagnosis.comparison import explanations as candidate
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
-from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, mean_of, smooth_functions
+from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.base.points import AXES, Floats, Ints, reading_name
+from cmm_uq.base.points import AXES, Floats, Ints, Points, reading_name
 from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import RecordingModel
@@ -136,6 +138,7 @@ class FunctionTerm:
 
 
 Seen = Callable[[Floats], Floats]
+Families = Iterator["FunctionFamily"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,9 +171,8 @@ class FunctionFamily:
         form, seen = self.shaped, self.seen
         if form is None or seen is None or not form.parameters:
             return None
-        part = np.stack(np.meshgrid(*[_PARTS] * len(form.parameters), indexing="ij"), axis=-1).reshape(
-            -1, len(form.parameters)
-        )
+        many = len(form.parameters)
+        part = np.stack(np.meshgrid(*[_PARTS] * many, indexing="ij"), axis=-1).reshape(-1, many)
         shapes = (form.shapes[nodes][:, None] + part * form.apart[nodes][:, None]).reshape(-1, part.shape[1])
         lengths = [k for k, name in enumerate(form.parameters) if name in ("width", "reach", "period")]
         kept = np.all(shapes[:, lengths] > 0, axis=1)
@@ -189,9 +191,9 @@ def families_of(model: RecordingModel, values: Floats, comparison: CandidateComp
     return [replace(family, log_prior=family.log_prior - float(np.log(terms))) for family in seen]
 
 
-def each_family(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
+def each_family(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Families:
     """One after the other, with the log prior of each within its term: all of many observations fill a memory."""
-    for of in (_of_points, _of_approach, _of_observations):
+    for of in (_of_points, _of_products, _of_observations):
         yield from of(model, values, comparison)
 
 
@@ -201,18 +203,22 @@ def _of_form(term: FunctionTerm, form: ClosedForm, seen: Seen, covariate: Floats
     return FunctionFamily(term, form.name, columns, log_prior, covariate, values, form, seen, form.formula)
 
 
-def _families(
-    term: FunctionTerm, seen: Seen, covariate: Floats, *, forms: bool = True, weight: float = 1.0
-) -> Iterator[FunctionFamily]:
-    """Of one covariate (p,); ``seen`` gives the columns (m, q) of functions (p, q)."""
-    log = float(np.log(weight)) - (float(np.log(3)) if forms else 0.0)
-    curves = {SMOOTH: list(smooth_functions(covariate)), ROUGH: list(_rough_functions(covariate)) if forms else []}
-    for form, of_form in curves.items():
-        for f in of_form:
-            yield FunctionFamily(term, form, seen(f)[:, None], log - float(np.log(len(of_form))), covariate, f[:, None])
-    every = list(forms_of(covariate, time=term.of == "time_s")) if forms else []
+def _without_curve(term: FunctionTerm, form: str, columns: Floats, log_prior: float, formula: str) -> FunctionFamily:
+    nowhere = np.zeros((0, 1, columns.shape[1]))
+    return FunctionFamily(term, form, columns[:, None], log_prior, np.zeros(0), nowhere, formula=formula)
+
+
+def _families(term: FunctionTerm, seen: Seen, c: Floats, *, forms: bool = True, weight: float = 1.0) -> Families:
+    """Of one covariate c (p,); ``seen`` gives the columns (m, q) of functions (p, q)."""
+    curves = [(SMOOTH, f) for f in candidate.smooth_functions(c)]
+    curves += [(ROUGH, f) for f in _rough_functions(c)] if forms else []
+    every = list(forms_of(c, time=term.of == "time_s")) if forms else []
+    alike = Counter([*(form for form, _ in curves), *(closed.name for closed in every)])  # each form equally probable
+    log = {form: float(np.log(weight / len(alike) / many)) for form, many in alike.items()}
+    for form, f in curves:
+        yield FunctionFamily(term, form, seen(f)[:, None], log[form], c, f[:, None])
     for closed in every:
-        yield _of_form(term, closed, seen, covariate, log - float(np.log(len(every) * len(closed.shapes))))
+        yield _of_form(term, closed, seen, c, log[closed.name] - float(np.log(len(closed.shapes))))
 
 
 def _rough_functions(covariate: Floats) -> Iterator[Floats]:
@@ -225,10 +231,10 @@ def _rough_functions(covariate: Floats) -> Iterator[Floats]:
         yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
 
 
-def _of_points(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
+def _of_points(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Families:
     scale, points = comparison.noise_scale, model.artefact.points.at(model.where(values))
     readings = {axis: read for axis, read in points.readings.items() if np.ptp(read) > 1.0}
-    arms = {axis: (read - 0.5 * (read.min() + read.max())) / (0.5 * np.ptp(read)) for axis, read in readings.items()}
+    arms = {axis: _centred(read) for axis, read in readings.items()}
 
     def moving(along: str, lever: Floats | float = 1.0) -> Seen:
         def seen(f: Floats) -> Floats:
@@ -238,10 +244,7 @@ def _of_points(model: RecordingModel, values: Floats, comparison: CandidateCompa
 
         return seen
 
-    varied = {
-        key: np.asarray(column) for key, column in points.columns.items()
-        if (key == "time_s" or key.startswith("temp_")) and len(np.unique(column)) > 2
-    }  # fmt: skip
+    varied = _varied(points)
     for along in AXES:
         for axis, read in readings.items():
             yield from _families(_curve(along, _letter(axis), reading_name(axis), _variable(axis)), moving(along), read)
@@ -249,50 +252,61 @@ def _of_points(model: RecordingModel, values: Floats, comparison: CandidateCompa
                 term = _turning(along, axis, lever, readings[lever])
                 yield from _families(term, moving(along, arms[lever]), read, forms=False, weight=_TURNED)
         for axis, other in (pair for pair in ("xy", "yz", "zx") if readings.keys() >= set(pair)):
-            u, v = arms[axis], arms[other]
-            for name, f in ((PRODUCT, (u * v)[:, None]), (BOWL, np.column_stack([u**2, v**2]))):
-                of = FunctionTerm(f"{axis}_mm,{other}_mm", _of_both(along, _letter(axis), other), along)
-                columns, (p, q) = moving(along)(UNKNOWN_SD * f)[:, None], (_arm(a, readings[a]) for a in (axis, other))
-                formula = f"{p}*{q}" if name == PRODUCT else f"{p}**2;{q}**2"
-                nowhere = np.zeros((0, 1, f.shape[1]))
-                yield FunctionFamily(of, name, columns, -float(np.log(2)), np.zeros(0), nowhere, formula=formula)
-        since = f"(time_s + {points.start!r})" if points.start else "time_s"
+            of = FunctionTerm(f"{axis}_mm,{other}_mm", _of_both(along, _letter(axis), other), along)
+            p, q = (_arm(a, readings[a]) for a in (axis, other))
+            for name, f, part, formula in _of_pair(arms[axis], arms[other], p, q):
+                yield _without_curve(of, name, moving(along)(f), float(np.log(part)), formula)
         if "time_s" in varied:  # all that stands on the axis shifts
-            yield from _families(_curve(along, in_words("time_s"), "time_s", since), moving(along), varied["time_s"])
-        for key, column in varied.items() if along in readings else ():
-            half, name = 0.5 * float(np.ptp(readings[along])), since if key == "time_s" else key
+            since, time = varied["time_s"]
+            yield from _families(_curve(along, in_words("time_s"), "time_s", since), moving(along), time)
+        for key, (name, column) in varied.items() if along in readings else ():
+            half = 0.5 * float(np.ptp(readings[along]))
             yield from _families(_scale(along, key, half, name), moving(along, readings[along] / half), column)
 
 
-def _of_approach(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Iterator[FunctionFamily]:
-    """Of a direction of travel, by as much everywhere and in proportion to a reading."""
+def _of_pair(u: Floats, v: Floats, p: str, q: str) -> Iterator[tuple[str, Floats, float, str]]:
+    """Forms of two readings, from −1 to 1 and as in a formula: functions (n, r), mm, how probable, and their formula."""
+    yield PRODUCT, UNKNOWN_SD * (u * v)[:, None], 1 / 3, f"{p}*{q}"
+    yield BOWL, UNKNOWN_SD * np.column_stack([u**2, v**2]), 1 / 3, f"{p}**2;{q}**2"
+    smooth = list(candidate.smooth_in_space(np.column_stack([u, v])))
+    yield from ((SMOOTH, f, 1 / 3 / len(smooth), "") for f in smooth)
+
+
+def _varied(points: Points) -> dict[str, tuple[str, Floats]]:
+    """Time and temperatures that were recorded, each with its name in a formula."""
+    found = {key: np.asarray(column) for key, column in points.columns.items() if key.startswith(("time_s", "temp_"))}
+    since = f"(time_s + {points.start!r})" if points.start else "time_s"
+    return {key: (since if key == "time_s" else key, c) for key, c in found.items() if len(np.unique(c)) > 2}
+
+
+def _of_products(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Families:
+    """Of a direction of travel, by as much everywhere and in proportion to a reading; and of what turns as it warms."""
     scale, points = comparison.noise_scale, model.artefact.points.at(model.where(values))
-    for along, key in product(range(3), (f"approach_{a}" for a in AXES if f"approach_{a}" in points.columns)):
-        for axis, read in ((axis, read) for axis, read in points.readings.items() if np.ptp(read) > 1.0):
-            arm = (read - 0.5 * (read.min() + read.max())) / (0.5 * np.ptp(read))
-            e = np.zeros((len(read), 3, 2))
-            e[:, along] = UNKNOWN_SD * points.columns[key][:, None] * np.column_stack([np.ones(len(arm)), arm])
-            of = FunctionTerm(f"{key},{axis}_mm", _of_both(AXES[along], in_words(key), axis), AXES[along])
-            columns = (model.seen(e, values) / scale[:, None])[:, None]
-            formula = f"{key};{key}*{_arm(axis, read)}"
-            yield FunctionFamily(of, PRODUCT, columns, 0.0, np.zeros(0), np.zeros((0, 1, 2)), formula=formula)
+    varied, readings = _varied(points), {axis: read for axis, read in points.readings.items() if np.ptp(read) > 1.0}
+    keys = [key for key in (*(f"approach_{a}" for a in AXES), *varied) if key in points.columns]
+    for along, key, (axis, read) in product(range(3), keys, readings.items()):
+        of = FunctionTerm(f"{key},{reading_name(axis)}", _of_both(AXES[along], in_words(key), axis), AXES[along])
+        arm, formula, part = _centred(read)[:, None], _arm(_variable(axis), read), _TURNED
+        if key in varied:
+            f, formula = _centred(varied[key][1])[:, None] * arm, f"{_arm(*varied[key])}*{formula}"
+        else:
+            f, formula, part = points.columns[key][:, None] * np.hstack([arm**0, arm]), f"{key};{key}*{formula}", 1.0
+        e = np.zeros((len(read), 3, f.shape[1]))
+        e[:, along] = UNKNOWN_SD * f
+        yield _without_curve(of, PRODUCT, model.seen(e, values) / scale[:, None], float(np.log(part)), formula)
 
 
-def _of_observations(
-    model: RecordingModel, values: Floats, comparison: CandidateComparison
-) -> Iterator[FunctionFamily]:
+def _of_observations(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Families:
     scale = comparison.noise_scale
     for key, column in model.artefact.points.own_columns.items():
-        mean = mean_of(model, column)
+        mean = candidate.mean_of(model, column)
         if len(np.unique(mean)) > 2:
             title = say("error as a function of {name}", name=in_words(key))
             yield from _families(FunctionTerm(key, title), lambda f: f / scale[:, None], mean)
     for one in (e for e in comparison.explanations if e.kind == UNKNOWN and e.covariate is None):
-        for member in one.members:
-            columns = (member.columns / scale[:, None])[:, None]
+        for each in one.members:
             log = -float(np.log(len(one.members)))
-            values = np.zeros((0, *columns.shape[1:]))
-            yield FunctionFamily(FunctionTerm(str(one.name), one.name), SMOOTH, columns, log, np.zeros(0), values)
+            yield _without_curve(FunctionTerm(str(one.name), one.name), SMOOTH, each.columns / scale[:, None], log, "")
 
 
 def _letter(axis: str) -> Text:
@@ -326,6 +340,11 @@ def _turning(along: str, axis: str, lever: str, arm: Floats) -> FunctionTerm:
 def _variable(axis: str) -> str:
     """What it reads, in a formula."""
     return axis if axis in AXES else reading_name(axis)
+
+
+def _centred(readings: Floats) -> Floats:
+    """From −1 to 1 over what was read."""
+    return np.asarray((readings - 0.5 * (readings.min() + readings.max())) / (0.5 * np.ptp(readings)))
 
 
 def _arm(axis: str, readings: Floats) -> str:

@@ -10,16 +10,18 @@ beside the most probable function where it has odds of 20 : 1.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import combinations as subsets
 
 import numpy as np
 import scipy
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, effect_of
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
-from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical import evidence
-from cmm_uq.analysis.diagnosis.empirical.functions import ROUGH, SMOOTH, FunctionFamily, FunctionTerm
+from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
+from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, ROUGH, SMOOTH, FunctionFamily, FunctionTerm
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
@@ -30,9 +32,11 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told
 _CLEAR = ODDS / (1 + ODDS)
+NAMED = 0.9  # probability from which an effect is named, alone or as one of a group, and in its own form
 MOST = 3  # functions together
 _SEEN = 1e-6  # rms over the noise, below which an effect shows nothing
 _TOLD, _ALSO = 0.01, 0.05  # probability from which a form, and another term, is told
+ALIKE = 1e-3  # part of an effect's squared length that others leave of it, up to which no number of repeats parts them
 _KNOTS, _STRAIGHT = 24, 0.01  # of a broken line for a smooth curve; part of its size that the line may be off
 _PRIOR = 3.0  # what its size may be in another recording, over what was found
 
@@ -84,7 +88,7 @@ class BestKnown:
 
 def empirical_model(result: SearchResult) -> EmpiricalModel | None:
     """What functions of what is recorded make of the misfit; nothing where none has odds of 20 : 1."""
-    data = evidence.FunctionFit.of(result, result.first.families)
+    data = FunctionFit.of(result, result.first.families)
     if not data.families or not data.degrees:
         return None
     beside, described = data.refined(), list[EmpiricalFunction]()
@@ -92,6 +96,11 @@ def empirical_model(result: SearchResult) -> EmpiricalModel | None:
         found = _described(beside, result)
         if any(one.term == found.term for one in described):  # names of a job's effects differ
             found = replace(found, stated=found.stated.replace('"\nformula', f'_{len(described) + 1}"\nformula', 1))
+        of, along = {*found.term.of.split(",")}, found.term.along
+        alike = [one.term.along == along and bool(of & {*one.term.of.split(",")}) for one in described]
+        if any(alike):  # what is left of a form says that it is another
+            described = [replace(one, form=None) if same else one for one, same in zip(described, alike, strict=True)]
+            found = replace(found, form=None)
         described.append(found)
         beside = beside.with_function(beside.versions(1)[0]).refined()
     if not described:
@@ -109,7 +118,7 @@ def empirical_model(result: SearchResult) -> EmpiricalModel | None:
     return EmpiricalModel(tuple(described[: chosen + 1]), gain, better)
 
 
-def _described(data: evidence.FunctionFit, result: SearchResult) -> EmpiricalFunction:
+def _described(data: FunctionFit, result: SearchResult) -> EmpiricalFunction:
     by: dict[FunctionTerm, dict[str, float]] = {}
     for family, (log, _) in zip(data.families, data.evidence, strict=True):
         of_term = by.setdefault(family.term, {})
@@ -139,17 +148,17 @@ def _described(data: evidence.FunctionFit, result: SearchResult) -> EmpiricalFun
     )
 
 
-def _of_functions(data: evidence.FunctionFit, result: SearchResult) -> float:
+def _of_functions(data: FunctionFit, result: SearchResult) -> float:
     """Probability that it is a function and no known effect."""
-    prior, every = log_prior(result.first.explanations) - np.log(SHARES[UNKNOWN]), enumerate(result.first.explanations)
-    others = (i for i, e in every if e.kind == EFFECT and i not in result.chosen)
-    effects = [prior[i] + np.logaddexp(*of_effect(result, i, data)) for i in others]
-    return float(scipy.special.expit(data.total - np.logaddexp.reduce(effects, initial=-np.inf)))
+    every = enumerate(result.first.explanations)
+    effects = [of_effect(result, i, data) for i, e in every if e.kind == EFFECT and i not in result.chosen]
+    return float(scipy.special.expit(data.total - np.logaddexp.reduce(np.ravel(effects), initial=-np.inf)))
 
 
-def of_effect(result: SearchResult, index: int, data: evidence.FunctionFit) -> tuple[float, float]:
-    """Log evidence of an effect in its own form, and in its other forms, as if it were a function of the fit."""
-    members, scale = result.first.explanations[index].members, result.first.comparison.noise_scale[:, None, None]
+def of_effect(result: SearchResult, index: int, data: FunctionFit) -> tuple[float, float]:
+    """Log evidence and prior of an effect in its own form, and in its other forms, as if it were a function of the fit."""
+    known, scale = result.first.explanations, result.first.comparison.noise_scale[:, None, None]
+    members, prior = known[index].members, float(log_prior(known)[index] - np.log(SHARES[UNKNOWN]))
     whole, found = sum(one.weight for one in members), [-np.inf, -np.inf]
     for rough, width in {(one.rough, one.columns.shape[1]) for one in members}:
         some = [one for one in members if (one.rough, one.columns.shape[1]) == (rough, width)]
@@ -157,23 +166,21 @@ def of_effect(result: SearchResult, index: int, data: evidence.FunctionFit) -> t
         # one that is found shows, at its largest, by as much as the noise
         rms = np.sqrt(np.sum(data.rest(columns) ** 2, axis=(0, 2)) / data.degrees) / data.least
         columns = columns / np.where((rms > _SEEN) & (rms < 1), rms, 1.0)[:, None]
-        family = FunctionFamily(data.families[0].term, "", columns, 0.0, np.zeros(0), np.zeros((0, *columns.shape[1:])))
-        log = data.of_family(family)[0] + np.log([one.weight / whole for one in some])[:, None]
+        own = FunctionFamily(data.families[0].term, "", columns, prior, np.zeros(0), np.zeros((0, *columns.shape[1:])))
+        log = data.of_family(own)[0] + np.log([one.weight / whole for one in some])[:, None]
         found[rough] = float(np.logaddexp(found[rough], scipy.special.logsumexp(log)))
     return found[0], found[1]
 
 
-def _seen(data: evidence.FunctionFit, result: SearchResult, family: int) -> tuple[Floats, Floats, Floats]:
+def _seen(data: FunctionFit, result: SearchResult, family: int) -> tuple[Floats, Floats, Floats]:
     covariate, model = data.families[family].covariate, result.first.model
     rows = model.artefact.rows[model.used]
-    each = (
-        covariate[:, None] if len(covariate) == len(rows) else covariate[rows] if len(covariate) else np.zeros((0, 1))
-    )
+    c = covariate[:, None] if len(covariate) == len(rows) else covariate[rows] if len(covariate) else np.zeros((0, 1))
     left = next(evidence.residuals(data, 0)) * result.first.comparison.noise_scale / MICROMETRE
-    return each.min(axis=1, initial=np.inf), each.max(axis=1, initial=-np.inf), left[: len(each)]
+    return c.min(axis=1, initial=np.inf), c.max(axis=1, initial=-np.inf), left[: len(c)]
 
 
-def _among(data: evidence.FunctionFit, chosen: Sequence[int]) -> list[tuple[evidence.FunctionVersion, float]]:
+def _among(data: FunctionFit, chosen: Sequence[int]) -> list[tuple[evidence.FunctionVersion, float]]:
     """Versions of some families that are probable, with their probability among these."""
     logs = {i: data.evidence[i][0] for i in chosen}
     total = scipy.special.logsumexp([scipy.special.logsumexp(log) for log in logs.values()])
@@ -186,7 +193,7 @@ def _among(data: evidence.FunctionFit, chosen: Sequence[int]) -> list[tuple[evid
     return [(version, p / every) for version, p in found]
 
 
-def _function(data: evidence.FunctionFit, chosen: Sequence[int]) -> tuple[Floats, Floats, Floats]:
+def _function(data: FunctionFit, chosen: Sequence[int]) -> tuple[Floats, Floats, Floats]:
     """The function of a term where its covariate is given, averaged over forms and sizes, and its standard uncertainty, µm."""
     covariate = data.families[chosen[0]].covariate
     x, order = np.unique(covariate, return_index=True)
@@ -204,14 +211,14 @@ def _function(data: evidence.FunctionFit, chosen: Sequence[int]) -> tuple[Floats
     return x, mean / MICROMETRE, np.sqrt(np.maximum(square - mean**2, 0.0)) / MICROMETRE
 
 
-def _amplitude(data: evidence.FunctionFit) -> float:
+def _amplitude(data: FunctionFit) -> float:
     """Largest part of an observation, µm, that the most probable function takes."""
     version = data.versions(1)[0]
     columns = data.families[version.family].columns[:, version.index]
     return float(np.abs(columns @ data.fitted(version)[0]).max()) / MICROMETRE
 
 
-def _named(data: evidence.FunctionFit, own: Sequence[int], name: str, probability: float) -> tuple[NamedForm, str]:
+def _named(data: FunctionFit, own: Sequence[int], name: str, probability: float) -> tuple[NamedForm, str]:
     versions = _among(data, own)
     weight = np.array([p for _, p in versions])
     each = [data.fitted(version)[:2] for version, _ in versions]
@@ -223,9 +230,7 @@ def _named(data: evidence.FunctionFit, own: Sequence[int], name: str, probabilit
     parameters = {"size_um": _quantity(float(mean[0]) if len(mean) == 1 else size, float(along**2 @ variance), "µm")}
     family = data.families[own[0]]
     nodes = [(data.families[version.family].shaped, version.index) for version, _ in versions]
-    shapes, apart = (
-        np.array([getattr(form, of)[index] if form else [] for form, index in nodes]) for of in ("shapes", "apart")
-    )
+    shapes, apart = (np.array([getattr(f, of)[k] if f else [] for f, k in nodes]) for of in ("shapes", "apart"))
     of = "mm" if family.term.of.endswith("_mm") else "s" if family.term.of == "time_s" else "1"
     text = family.formula
     values = weight @ shapes
@@ -278,8 +283,72 @@ def best_known(result: SearchResult) -> BestKnown | None:
     odds = float(np.exp(min(max(first.log_odds[functions], default=-np.inf) - first.log_odds[best], 700.0)))
     member = first.comparison.beside((), (best,))[best][1].member
     columns = first.explanations[best].members[member].columns / first.comparison.noise_scale[:, None]
-    alone = replace(evidence.FunctionFit.of(result, ()), free=first.comparison.baseline)  # with nothing asserted
+    alone = replace(FunctionFit.of(result, ()), free=first.comparison.baseline)  # with nothing asserted
     effect, combinations = effect_of(first.explanations[best]), result.combinations
     probability = 0.0 if combinations is None else combinations.of(best)
     gain = evidence.improvement_by(result, alone, columns)
     return BestKnown(effect.name, effect.title, probability, odds, gain, effect.points_to)
+
+
+def other_forms(result: SearchResult, data: FunctionFit, of: Sequence[int]) -> tuple[dict[int, FunctionTerm], bool]:
+    """Of effects that have another form what the readings show in their place; whether a function is shown beside all."""
+    data = replace(data, free=np.hstack([data.free, _straight_lines(result)]))
+    beside, finer = list[FunctionTerm](), data.refined()
+    while len(beside) < MOST and finer.total - finer.nothing > np.log(ODDS):
+        beside.append(_likeliest(finer))
+        data = replace(finer.with_function(finer.versions(1)[0]), families=data.families)
+        finer = data.refined()
+    found = {i: other for i in of if (other := _other_form(result, data, i, beside)) is not None}
+    if not found:
+        found = {k: term for two in subsets(of, 2) for term in _one_of_both(result, data, *two) for k in two}
+    return found, bool(beside)
+
+
+def _other_form(result: SearchResult, data: FunctionFit, i: int, beside: Sequence[FunctionTerm]) -> FunctionTerm | None:
+    """What the readings show in the place of an effect, or of what it is a function, beside it."""
+    known, without = result.first.explanations[i], _without(result, data, i)
+    if effect_of(known).everywhere:  # a straight line has no other form
+        return None
+    of = {*effect_of(known).columns, *(t.of for t in known.imitated_by)}
+    if other := next((one for one in beside if of & set(one.of.split(","))), None):
+        return other
+    shown = without.rest(known.members[0].columns / result.first.comparison.noise_scale[:, None])
+    # a product of which it is a part is no other form: what that has besides would show beside it
+    others = [f for f in data.families if f.form != PRODUCT or not _part(shown, without.rest(f.columns[:, 0]))]
+    without = replace(without, families=others).refined()
+    own, another = np.array(of_effect(result, i, without)) - np.log(known.weight)  # its rarity was counted before
+    every = np.logaddexp.reduce([own, another, without.total])
+    return _likeliest(without) if own < np.log(NAMED) + every else None
+
+
+def _one_of_both(result: SearchResult, data: FunctionFit, one: int, other: int) -> Iterator[FunctionTerm]:
+    """A function of two readings in the place of two effects along one axis, each by one of them: of wear twice, a hill."""
+    of_one, of_other = (result.first.explanations[i].imitated_by for i in (one, other))
+    both = {(frozenset((a.of, b.of)), a.along) for a in of_one for b in of_other if a.along == b.along and a.of != b.of}
+    families = [f for f in data.families if (frozenset(f.term.of.split(",")), f.term.along) in both]
+    if families:
+        without, beside = replace(_without(result, data, one, other), families=families), _without(result, data, one)
+        own = of_effect(result, other, without)[0] + of_effect(result, one, beside)[0] - beside.nothing
+        if own < np.log(NAMED) + np.logaddexp(own, without.total):
+            yield _likeliest(without)
+
+
+def _without(result: SearchResult, data: FunctionFit, *gone: int) -> FunctionFit:
+    return replace(data, free=np.hstack([withhold(result, frozenset(gone)).last.baseline, _straight_lines(result)]))
+
+
+def _straight_lines(result: SearchResult) -> Floats:
+    """Columns (m, k) of scales and squarenesses that are probable and not asserted: no other error is to stand for them."""
+    probable = frozenset[int]() if result.combinations is None else result.combinations.most_probable
+    every = result.first.explanations
+    some = [every[i].members[0].columns for i in sorted(probable - result.chosen) if every[i].together]
+    return np.hstack([np.zeros((len(result.last.baseline), 0)), *some]) / result.first.comparison.noise_scale[:, None]
+
+
+def _part(columns: Floats, whole: Floats) -> bool:
+    left = columns - whole @ np.linalg.lstsq(whole, columns, rcond=None)[0]
+    return bool(np.sum(left**2) < ALIKE * np.sum(columns**2))
+
+
+def _likeliest(data: FunctionFit) -> FunctionTerm:
+    return data.families[data.versions(1)[0].family].term

@@ -223,11 +223,8 @@ def _warming(surroundings: Surroundings, plan: Plan, points: Points, pose: PartP
     bases = {"warming of the part": surroundings.part.cte_per_k * done * _about(plan)}
     for i, (axis, scale) in enumerate(zip(AXES, surroundings.scales, strict=True)):
         bases[f"warming of scale {axis}"] = pose.back(-scale.cte_per_k * done * points.carriages[:, [i]] * np.eye(3)[i])
-    return [
-        CommonCause(name=TEMPERATURE, factors=(factor,), draw=normal([kelvin]), basis=basis[None])
-        for factor, basis in bases.items()
-        if kelvin and np.any(basis)
-    ]
+    seen = {factor: b[None] for factor, b in bases.items() if kelvin and np.any(b)}
+    return [CommonCause(name=TEMPERATURE, factors=(f,), draw=normal([kelvin]), basis=b) for f, b in seen.items()]
 
 
 def _about(plan: Plan) -> Floats:
