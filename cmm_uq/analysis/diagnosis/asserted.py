@@ -31,8 +31,8 @@ from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member, effect_of
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, NAMED, ODDS, other_forms
-from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
+from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, ODDS, other_forms
+from cmm_uq.analysis.diagnosis.joint import NAMED, JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.values import dataclass, replace

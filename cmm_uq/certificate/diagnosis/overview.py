@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq.analysis.diagnosis.asserted import OmittedEffect
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.diagnosis.empirical.model import NAMED
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.diagnosis.joint import Mode, WithheldEffect
+from cmm_uq.analysis.diagnosis.joint import NAMED, Mode, WithheldEffect
 from cmm_uq.analysis.planning.set_up import odds_words
 from cmm_uq.analysis.screening.columns import Finding
 from cmm_uq.base import messages

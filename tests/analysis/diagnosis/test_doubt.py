@@ -11,8 +11,8 @@ import pytest
 from cmm_uq.analysis.diagnosis.asserted import doubted, least_supported
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, withhold
 from cmm_uq.analysis.diagnosis.diagnosis import diagnose
-from cmm_uq.analysis.diagnosis.empirical.model import NAMED, empirical_model
-from cmm_uq.analysis.diagnosis.joint import WithheldEffect
+from cmm_uq.analysis.diagnosis.empirical.model import empirical_model
+from cmm_uq.analysis.diagnosis.joint import NAMED, WithheldEffect
 from cmm_uq.artefacts.ballbar import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.model import Noise, RecordingModel

@@ -23,6 +23,7 @@ from cmm_uq.analysis.diagnosis.empirical import evidence
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
 from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, ROUGH, SMOOTH, FunctionFamily, FunctionTerm
 from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.joint import NAMED
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
@@ -32,7 +33,6 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told
 _CLEAR = ODDS / (1 + ODDS)
-NAMED = 0.9  # probability from which an effect is named, alone or as one of a group, and in its own form
 MOST = 3  # functions together
 _SEEN = 1e-6  # rms over the noise, below which an effect shows nothing
 _TOLD, _ALSO = 0.01, 0.05  # probability from which a form, and another term, is told
