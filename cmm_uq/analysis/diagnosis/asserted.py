@@ -29,7 +29,7 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import (
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member, effect_of
-from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, rivals_of
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
 from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, ODDS, other_forms
 from cmm_uq.analysis.diagnosis.joint import NAMED, JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
@@ -263,9 +263,8 @@ def probability_of(result: SearchResult, index: int, *, known: bool) -> tuple[fl
     combinations = result.combinations
     if combinations is None:
         return 0.0, 0.0, ()
-    group = jointly.group_of(combinations, result.chosen, index)
-    group |= frozenset() if known else combinations.imitating(index)
-    group = _as_well(result, index, group)
+    group_of = jointly.group_of if known else rivals_of  # without functions: a few places show any period, and none
+    group = _as_well(result, index, group_of(combinations, result.chosen, index))
     ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
     names = tuple(combinations.explanations[i].name for i in ordered)
     return combinations.of(index), combinations.of_any(group | {index}), names
@@ -315,10 +314,8 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
     if data is None or not data.families or not data.degrees:
         return gone, False
     others, beside = other_forms(result, data, [i for i in sorted(result.chosen) if _known(result, i)])
-    for i, other in others.items():
-        why = say("the readings show another form: {function}", function=other.title)
-        gone[i] = withheld_effect(result, i, why)
-    return gone, beside
+    why = {i: say("the readings show another form: {function}", function=other.title) for i, other in others.items()}
+    return {i: withheld_effect(result, i, one) for i, one in why.items()}, beside
 
 
 def least_supported(result: SearchResult) -> dict[int, WithheldEffect]:
@@ -326,15 +323,13 @@ def least_supported(result: SearchResult) -> dict[int, WithheldEffect]:
 
     Those of a machine out of adjustment make each other probable, and none of them is ever exactly zero: that is no evidence.
     """
-    comparison, weakest, least = result.first.comparison, -1, float(np.log(ODDS))
+    comparison, own = result.first.comparison, dict[int, float]()
     for i in (i for i in sorted(result.chosen) if result.first.explanations[i].together):
         given = [v for v in result.versions if v.explanation != i]
-        own = comparison.beside(given, (i,))[i][0] - float(comparison.log_evidence_of(given)[0])
-        if own < least:
-            weakest, least = i, own
-    if weakest < 0:
+        own[i] = comparison.beside(given, (i,))[i][0] - float(comparison.log_evidence_of(given)[0])
+    if not own or own[weakest := min(own, key=lambda i: own[i])] >= np.log(ODDS):
         return {}
-    alone = float(scipy.special.expit(least))
+    alone = float(scipy.special.expit(own[weakest]))
     return {weakest: replace(withheld_effect(result, weakest, UNSUPPORTED), probability=alone)}
 
 

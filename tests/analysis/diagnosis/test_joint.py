@@ -8,6 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.diagnosis.asserted import IMPROBABLE
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
@@ -45,9 +46,20 @@ def plate(places: Floats) -> Diagnosis:
 
 
 @pytest.mark.long
-def test_five_places_at_equal_distances_do_not_tell_a_period_from_its_aliases() -> None:
-    """Sampled every 5 mm, frequencies that differ or sum up to a multiple of 1/5 mm⁻¹ are one (sampling theorem)."""
+def test_five_places_do_not_tell_a_period_from_a_function() -> None:
+    """Less a scale and where the plate stood three figures remain, and amplitude, phase and period are three."""
     found = plate(PITCH * np.arange(5))
+    assert (found.verdict, found.effects) == ("empirical", ())
+    (gone,) = found.withheld
+    assert (gone.effect, gone.why) == ("periodic_scale_x", IMPROBABLE)
+    assert found.best_known is not None
+    assert found.best_known.effect == "periodic_scale_x"
+
+
+@pytest.mark.long
+def test_eight_places_at_equal_distances_do_not_tell_a_period_from_its_aliases() -> None:
+    """Sampled every 5 mm, frequencies that differ or sum up to a multiple of 1/5 mm⁻¹ are one (sampling theorem)."""
+    found = plate(PITCH * np.arange(8))
     (item,) = found.effects
     assert (item.effect, item.settled) == ("periodic_scale_x", False)
     assert set(item.parameters) == {"amplitude_um"}, "no period and no phase"

@@ -23,7 +23,7 @@ from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import RecordingModel
 
 SMOOTH, ROUGH = "smooth", "rough"  # of no form in particular, with a slope everywhere and without
-PRODUCT, BOWL = "product", "bowl"  # forms of two readings
+PRODUCT, BOWL, SINE = "product", "bowl", "sine"  # forms, the first two of two readings
 _STEPS, _HINGES, _PLACES, _SATURATES, _PHASES = 40, 19, 24, 15, 12
 _WIDTHS, _SOFT, _REACHES, _DEAD = (0.03, 0.06, 0.12), (0.04, 0.08, 0.16), (0.05, 0.1, 0.2, 0.4), 6
 _CENTRES = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of a dead zone, in halves of the range
@@ -73,7 +73,7 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
     period = span / np.arange(_WHOLE, min(_SINES, 0.5 * len(distinct)), _BETWEEN)
     for orders in ((1,), (1, 2)) if len(period) > 1 else ():
         waves = [f"{wave}({2 * order}*pi*c/period)" for order in orders for wave in ("cos", "sin")]
-        yield _even("sine", ("period",), period, partial(_waves, orders), ";".join(waves))
+        yield _even(SINE, ("period",), period, partial(_waves, orders), ";".join(waves))
     period = span / np.arange(_SEVERAL, min(_TEETH, 0.25 * len(distinct)), _BETWEEN)
     if len(period) > 1:
         grid, apart = _grid(period, np.arange(_PHASES) / _PHASES)

@@ -21,7 +21,7 @@ from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical import evidence
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, ROUGH, SMOOTH, FunctionFamily, FunctionTerm
+from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, ROUGH, SINE, SMOOTH, FunctionFamily, FunctionTerm
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import NAMED
 from cmm_uq.analysis.diagnosis.location import without_unseen
@@ -313,8 +313,10 @@ def _other_form(result: SearchResult, data: FunctionFit, i: int, beside: Sequenc
     if other := next((one for one in beside if of & set(one.of.split(","))), None):
         return other
     shown = without.rest(known.members[0].columns / result.first.comparison.noise_scale[:, None])
-    # a product of which it is a part is no other form: what that has besides would show beside it
-    others = [f for f in data.families if f.form != PRODUCT or not _part(shown, without.rest(f.columns[:, 0]))]
+    # a product or a wave of which it is a part is no other form: what that has besides would show beside it
+    waves = {(t.of, t.along) for t in known.imitated_by if any(s.period_along for s in effect_of(known).shape)}
+    others = [f for f in data.families if f.form != SINE or (f.term.of, f.term.along) not in waves]
+    others = [f for f in others if f.form != PRODUCT or not _part(shown, without.rest(f.columns[:, 0]))]
     without = replace(without, families=others).refined()
     own, another = np.array(of_effect(result, i, without)) - np.log(known.weight)  # its rarity was counted before
     every = np.logaddexp.reduce([own, another, without.total])
@@ -340,8 +342,8 @@ def _without(result: SearchResult, data: FunctionFit, *gone: int) -> FunctionFit
 def _straight_lines(result: SearchResult) -> Floats:
     """Columns (m, k) of scales and squarenesses that are probable and not asserted: no other error is to stand for them."""
     probable = frozenset[int]() if result.combinations is None else result.combinations.most_probable
-    every = result.first.explanations
-    some = [every[i].members[0].columns for i in sorted(probable - result.chosen) if every[i].together]
+    every = (result.first.explanations[i] for i in sorted(probable - result.chosen))
+    some = [one.members[0].columns for one in every if one.together]
     return np.hstack([np.zeros((len(result.last.baseline), 0)), *some]) / result.first.comparison.noise_scale[:, None]
 
 
