@@ -29,7 +29,7 @@ _LIKELY = 1e-4  # part of the largest probability below which a trial parts one 
 # Frequencies that are this far apart, over one in the range of the readings, with nothing likely between, are two modes
 _APART = 0.5
 _VALLEY = 0.1  # evidence over that of the lower of two peaks below which what lies between parts two modes
-NAMED = 0.9  # probability from which an effect is named, alone or as one of a group, and in its own form
+NAMED = 0.9  # probability from which an effect is named, alone or as one of a group
 _TOLD = 1e-3  # probability from which a mode is told
 
 

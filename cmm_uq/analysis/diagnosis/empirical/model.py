@@ -23,7 +23,6 @@ from cmm_uq.analysis.diagnosis.empirical import evidence
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
 from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, ROUGH, SINE, SMOOTH, FunctionFamily, FunctionTerm
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.diagnosis.joint import NAMED
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
@@ -34,6 +33,7 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 ODDS = 20.0  # of a further function over none, and of a form over all else, from which it is told
 _CLEAR = ODDS / (1 + ODDS)
 MOST = 3  # functions together
+_OWN = 0.8  # probability of an effect's own form, from which it keeps its name
 _SEEN = 1e-6  # rms over the noise, below which an effect shows nothing
 _TOLD, _ALSO = 0.01, 0.05  # probability from which a form, and another term, is told
 ALIKE = 1e-3  # part of an effect's squared length that others leave of it, up to which no number of repeats parts them
@@ -320,7 +320,7 @@ def _other_form(result: SearchResult, data: FunctionFit, i: int, beside: Sequenc
     without = replace(without, families=others).refined()
     own, another = np.array(of_effect(result, i, without)) - np.log(known.weight)  # its rarity was counted before
     every = np.logaddexp.reduce([own, another, without.total])
-    return _likeliest(without) if own < np.log(NAMED) + every else None
+    return _likeliest(without) if own < np.log(_OWN) + every else None
 
 
 def _one_of_both(result: SearchResult, data: FunctionFit, one: int, other: int) -> Iterator[FunctionTerm]:
@@ -331,7 +331,7 @@ def _one_of_both(result: SearchResult, data: FunctionFit, one: int, other: int) 
     if families:
         without, beside = replace(_without(result, data, one, other), families=families), _without(result, data, one)
         own = of_effect(result, other, without)[0] + of_effect(result, one, beside)[0] - beside.nothing
-        if own < np.log(NAMED) + np.logaddexp(own, without.total):
+        if own < np.log(_OWN) + np.logaddexp(own, without.total):
             yield _likeliest(without)
 
 
