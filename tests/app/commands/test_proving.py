@@ -141,7 +141,8 @@ def paths(data: Any, here: str = "") -> Iterator[str]:
 
 
 def described(path: str) -> bool:
-    return any(covers(pattern.split("."), told, path.split(".")) for pattern, told in PROOF.items())
+    empty = any(pattern.startswith(f"{path}[].") for pattern in PROOF)  # a table without rows, as where nothing is named
+    return empty or any(covers(pattern.split("."), told, path.split(".")) for pattern, told in PROOF.items())
 
 
 def covers(names: list[str], told: str, parts: list[str]) -> bool:
