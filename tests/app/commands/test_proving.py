@@ -141,7 +141,9 @@ def paths(data: Any, here: str = "") -> Iterator[str]:
 
 
 def described(path: str) -> bool:
-    empty = any(pattern.startswith(f"{path}[].") for pattern in PROOF)  # a table without rows, as where nothing is named
+    empty = any(
+        pattern.startswith(f"{path}[].") for pattern in PROOF
+    )  # a table without rows, as where nothing is named
     return empty or any(covers(pattern.split("."), told, path.split(".")) for pattern, told in PROOF.items())
 
 
