@@ -8,7 +8,7 @@ beforehand does not either. Of fifty effects some three imitate any weak one wit
 end it, and it is no reason to doubt what is found.
 
 A name is for a technician who acts on it: nine in ten is asked of an effect, or of it with what the readings do not tell from
-it, and of its form among all that an error could be (:mod:`~cmm_uq.analysis.diagnosis.empirical.model`).
+it, and four in five of its form among all that an error could be (:mod:`~cmm_uq.analysis.diagnosis.empirical.model`).
 """
 
 from __future__ import annotations
@@ -334,6 +334,6 @@ def least_supported(result: SearchResult) -> dict[int, WithheldEffect]:
 
 
 def _known(result: SearchResult, index: int) -> bool:
-    """Whether an effect has no period, or one that is settled; of others functions of the same reading are named with it."""
+    """Whether an effect has no period, or one that is settled; of others no form is known that functions could deny."""
     modes = period_modes(result, index)
     return not modes or jointly.period_settled(result, index, modes)

@@ -10,7 +10,7 @@ from openpyxl import Workbook
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.jobs.importing.format import Fact, ImportKeys, Recognition
+from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Recognition
 from cmm_uq.jobs.importing.recording import ImportedTable, imported
 
 TARGETS = [100.0 * k for k in range(6)]
@@ -143,5 +143,5 @@ def test_hidden_rows_of_a_workbook_are_left_out_by_name() -> None:
 
 def test_errors_in_parts_of_a_length_are_no_lengths() -> None:
     rows = [f"{axis};{n};{n / 7:.2f};{n / 9 - 1:.2f}" for axis in "XYZ" for n in (1, 2, 3, 4)]
-    with pytest.raises(CmmUqError):
+    with pytest.raises(NotReadError):
         read(["axis;nominal length/m;relative error/ppm run 1;relative error/ppm run 2", *rows])
