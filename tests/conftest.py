@@ -7,6 +7,7 @@ import inspect
 import os
 import shutil
 from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import CodeType
@@ -175,6 +176,21 @@ def job(iota: Path, tmp_path: Path) -> Path:
 def no_regions(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests that analyse a job of their own, and are not about where in the machine its errors hold."""
     monkeypatch.setattr("cmm_uq.app.commands.report.factor_regions", lambda *_: NOTHING)
+
+
+@contextmanager
+def formless() -> Iterator[None]:
+    """Without functions of unknown form, half of a diagnosis of what agrees with its model: where these are not the matter."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("cmm_uq.analysis.diagnosis.comparison.search.lack_of_form", lambda *_: 1.0)
+        yield
+
+
+@pytest.fixture
+def no_forms() -> Iterator[None]:
+    """For tests that analyse a job of their own, and are not about what its model leaves out."""
+    with formless():
+        yield
 
 
 @pytest.fixture
