@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +15,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.job import PartJob, part_of
 from tests.conftest import ROOT
 from tests.jobs.part.parts import tables
+from tests.shared import shared_files
 
 MACHINE = "bryan-simulated"
 PDF = "machine/certificate-simulated.pdf"
@@ -27,22 +24,11 @@ THERE = {"machine_state": {"certificate": "machine",
 """What the machine's results do not say, and its certificate does."""
 
 
-@cache
+@shared_files
 def report() -> Mapping[str, bytes]:
     """Files of the machine's report, by name."""
-    share = os.environ.get("CMM_UQ_TESTS_SHARE")
-    folder = Path(share or tempfile.mkdtemp()) / "part-machine"
-    if not (folder / "manifest.json").exists():
-        job = read_job(ROOT / "examples" / MACHINE)
-        contents = REPORT.contents(report_outcome(job))
-        folder.mkdir(exist_ok=True)
-        for name, content in {**contents, "manifest.json": b""}.items():
-            own = folder / f"{name}.{os.getpid()}"
-            own.write_bytes(content)
-            own.replace(folder / name)
-    return {
-        path.name: path.read_bytes() for path in folder.iterdir() if path.suffix in (".pdf", ".json", ".npz", ".xml")
-    }
+    contents = REPORT.contents(report_outcome(read_job(ROOT / "examples" / MACHINE)))
+    return {name: content for name, content in contents.items() if not name.endswith(".html")}
 
 
 def by_certificate() -> dict[str, bytes]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import pickle
 from collections.abc import Mapping
 from dataclasses import replace
@@ -25,6 +24,7 @@ from cmm_uq.maths.inference.families import FieldModel
 from cmm_uq.maths.inference.family_sizes import USUAL, Effort, FieldSizes, sample_sizes
 from cmm_uq.maths.inference.noise import Sizes
 from tests.part_machines import by_certificate, plate_of
+from tests.shared import shared_files
 
 TRIALS = 1000  # enough to be computed again to the byte; how near draws come to the truth is looked at elsewhere
 
@@ -37,19 +37,10 @@ def plate_found() -> PartMeasurement:
     return evaluate_part(plate_of(by_certificate(), off), PartOptions(trials=TRIALS))
 
 
-@cache
+@shared_files
 def plate_report() -> Mapping[str, bytes]:
-    """Its files, by name, as another process may have made them already."""
-    share = os.environ.get("CMM_UQ_TESTS_SHARE")
-    if share is None:
-        return contents_of(plate_found())
-    path = Path(share) / "part-report.pickle"
-    if not path.exists():
-        own = path.with_suffix(f".{os.getpid()}")
-        own.write_bytes(pickle.dumps(dict(contents_of(plate_found()))))
-        own.replace(path)
-    files: dict[str, bytes] = pickle.loads(path.read_bytes())
-    return files
+    """Its files, by name."""
+    return contents_of(plate_found())
 
 
 _AGAIN: dict[tuple[object, ...], PartMeasurement] = {}
@@ -104,11 +95,3 @@ def with_inputs(**changed: bytes) -> dict[str, bytes]:
     found = plate_found()
     inputs = {name: changed.get(Path(name).stem.partition("-")[0], data) for name, data in found.job.inputs.items()}
     return contents_of(replace(found, job=replace(found.job, inputs=inputs)))
-
-
-def put(folder: Path, files: Mapping[str, bytes]) -> Path:
-    """Files in a folder."""
-    for name, content in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    return folder

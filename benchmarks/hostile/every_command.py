@@ -167,6 +167,7 @@ def _made() -> Mapping[str, bytes]:
     from tests.app.cli.process import run
     from tests.app.commands.test_compensate_cloud import square
     from tests.laboratory.live.session import job_folder
+    from tests.shared import files_below
 
     profile = next((Path(__file__).parents[2] / "cmm_uq").rglob("line-logger.toml")).read_bytes()
     key = trial_key("A. Huber", "open", dt.datetime.now(dt.UTC) - dt.timedelta(days=1))
@@ -195,11 +196,7 @@ def _made() -> Mapping[str, bytes]:
         assert signed.returncode == 0, signed.stderr
         square(folder)
         (folder / "job").rename(folder / "digitizer")
-        made = {
-            path.relative_to(folder).as_posix(): path.read_bytes()
-            for path in sorted(folder.rglob("*"))
-            if path.is_file()
-        }
+        made = files_below(folder)
     made |= {f"iota/{name}": content for name, content in seeds()["compensable"].files.items()}
     exports = Path(__file__).parents[2] / "tests" / "jobs" / "importing"  # of other programs
     for name, source in (
@@ -219,17 +216,21 @@ def _made() -> Mapping[str, bytes]:
 
 def _report_part(folder: Path) -> None:
     """A part's report in the records, and the entry of one that the machine 77 measured."""
+    import pytest
+
     from cmm_uq.app.commands.parts.part import PartOptions, write_part
     from cmm_uq.laboratory.records import open_records
     from tests.laboratory.records.test_parts import part
     from tests.part_machines import THERE, by_results, plate_files
+    from tests.part_reports import nothing_foreseen
+    from tests.shared import put
 
     with open_records(folder / RECORDS) as records:
         records.append_all([(*part(dt.date(2026, 5, 31), "77", "Optical digitizer")[:2], None)])
-    for name, content in plate_files(by_results(), np.zeros((60, 3)), **THERE).items():
-        (folder / "plate" / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / "plate" / name).write_bytes(content)
-    write_part(folder / "plate", folder / PART, options=PartOptions(trials=1000), records=folder / RECORDS)
+    put(folder / "plate", plate_files(by_results(), np.zeros((60, 3)), **THERE))
+    with pytest.MonkeyPatch.context() as patched:
+        nothing_foreseen(patched)  # no command reads it again
+        write_part(folder / "plate", folder / PART, options=PartOptions(trials=1000), records=folder / RECORDS)
 
 
 def unaltered(number: int) -> Case:

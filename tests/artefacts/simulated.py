@@ -6,11 +6,9 @@ Their documents are made once for all processes of a run of the tests, in its te
 from __future__ import annotations
 
 import json
-import os
 import pickle
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from cmm_uq.app.api.outcomes import Report
@@ -23,22 +21,10 @@ from cmm_uq.certificate.origin import as_json
 from cmm_uq.certificate.result import AnalysisResult, Outcome, Result
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
+from tests.shared import shared
 
 SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
 SQUARE = {"squareness_xy": 12.0, "squareness_yz": -7.5, "squareness_zx": 4.0}
-
-
-def shared(name: str, make: Callable[[], bytes]) -> bytes:
-    """What another process of this run may have made already; two at once make the same."""
-    folder = os.environ.get("CMM_UQ_TESTS_SHARE")
-    if folder is None:
-        return make()
-    path = Path(folder) / name
-    if not path.exists():
-        own = path.with_suffix(f".{os.getpid()}")
-        own.write_bytes(make())
-        own.replace(path)
-    return path.read_bytes()
 
 
 def kept(make: Callable[[str], Document]) -> Callable[[str], Document]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.laboratory.records import open_records
 from tests.app.cli.process import run
-from tests.conftest import ROOT
+from tests.conftest import ROOT, formless
+from tests.shared import files_below, put, shared_files
 
 PLACE = Path("reports") / "records.db"
 """Of the records, in the laboratory's folder."""
@@ -44,17 +46,27 @@ due = 2099-01-01
 
 
 def reported(folder: Path) -> Path:
-    """The folder of a laboratory with one certificate, K-1 of the machine 77: a digitizer, the cheapest kind."""
-    job = Path(shutil.copytree(ROOT / "examples" / "digitizer-simulated", folder / "job"))
-    toml = (job / "job.toml").read_text(encoding="utf-8")
-    toml = toml.replace('id = "digitizer-simulated"', 'id = "mount"').replace('origin = "simulated"', 'number = "K-1"')
-    toml = toml.replace("[machine]\n", f'{STATED}[machine]\nserial = "77"\n').replace(
-        "[recording]\n", f"{CHAIN}[recording]\n"
-    )
-    (job / "job.toml").write_text(toml, encoding="utf-8")
-    done = run("report", job, "--out", folder / "reports" / "mount", "--records", folder / PLACE, "--quiet")
-    assert done.returncode == 0, done.stderr
-    return folder
+    """The folder of a laboratory with one certificate, K-1 of the machine 77: a digitizer."""
+    return put(folder, _reported())
+
+
+@shared_files
+def _reported() -> Mapping[str, bytes]:
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        job = Path(shutil.copytree(ROOT / "examples" / "digitizer-simulated", folder / "job"))
+        toml = (job / "job.toml").read_text(encoding="utf-8")
+        toml = toml.replace('id = "digitizer-simulated"', 'id = "mount"').replace(
+            'origin = "simulated"', 'number = "K-1"'
+        )
+        toml = toml.replace("[machine]\n", f'{STATED}[machine]\nserial = "77"\n').replace(
+            "[recording]\n", f"{CHAIN}[recording]\n"
+        )
+        (job / "job.toml").write_text(toml, encoding="utf-8")
+        with formless():
+            done = run("report", job, "--out", folder / "reports" / "mount", "--records", folder / PLACE, "--quiet")
+        assert done.returncode == 0, done.stderr
+        return files_below(folder)
 
 
 def older(folder: Path, version: str, change: Callable[[dict[str, Any]], None] = lambda _: None) -> None:

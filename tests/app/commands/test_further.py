@@ -28,8 +28,9 @@ from cmm_uq.jobs.part.job import read_part
 from tests.app.commands.test_verify_part import OTHER
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, PDF, by_certificate, by_results, plate_files, plate_of
-from tests.part_reports import put, sampled_once, unchanged
+from tests.part_reports import sampled_once, unchanged
 from tests.result_keys import PART_RESULTS
+from tests.shared import put
 
 IOTA = ROOT / "examples" / "part-iota" / "machine" / "certificate.pdf"
 GAUGE = {"gauge.pdf": OTHER.read_bytes()}

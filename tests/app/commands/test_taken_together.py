@@ -22,7 +22,7 @@ from cmm_uq.certificate.render import render_html
 from cmm_uq.jobs.job import Job
 from tests.app.commands.test_verify_part import OTHER
 from tests.conftest import ROOT
-from tests.part_reports import put
+from tests.shared import put
 
 EXAMPLES = ROOT / "examples"
 IOTA = EXAMPLES / "part-iota" / "machine" / "certificate.pdf"
@@ -118,11 +118,13 @@ def test_one_of_another_machine_or_altered_is_refused_before_anything_is_compute
     assert any(words in str(one) and one.fix for one in check_read(job).problems)
 
 
+@pytest.mark.usefixtures("no_forms")
 def test_a_report_refuses_what_a_check_does() -> None:
     with pytest.raises(CmmUqError, match=r"half\.pdf"):
         report_outcome(job_of(beside(PLATE, half=OTHER.read_bytes()[:5000])))
 
 
+@pytest.mark.usefixtures("no_forms")
 def test_a_simulated_recording_is_not_taken_together_with_a_measured_one() -> None:
     measured = PLATE["job.toml"].replace(b'origin = "simulated"\n', b"")
     job = job_of(beside({**PLATE, "job.toml": measured}, gauge=OTHER.read_bytes()))

@@ -26,7 +26,8 @@ from cmm_uq.certificate.part.measurement import PartMeasurement, standing_data
 from cmm_uq.laboratory.records import open_records
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
-from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, put, unchanged, with_inputs
+from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, unchanged, with_inputs
+from tests.shared import put
 
 pytestmark = pytest.mark.long  # all need what takes long to make
 

@@ -19,7 +19,8 @@ from cmm_uq.certificate.part.measurement import PartMeasurement
 from tests.app.cli.test_due import recorded, scale
 from tests.conftest import ROOT
 from tests.part_machines import PDF as MACHINE_PDF, by_certificate, plate_of
-from tests.part_reports import drawn_once, put
+from tests.part_reports import drawn_once
+from tests.shared import put
 
 PDF = "part-simulated.pdf"
 TRIALS = 4000  # with fewer, what a forged history changes would be within what computing again allows for the draws

@@ -20,7 +20,8 @@ from cmm_uq.jobs.part.job import TABLES, part_of, read_part
 from cmm_uq.jobs.verdicts import gravest
 from tests.jobs.part.test_qif import document
 from tests.part_machines import by_certificate, plate_files, plate_of
-from tests.part_reports import nothing_foreseen, put
+from tests.part_reports import nothing_foreseen
+from tests.shared import put
 
 once = pytest.fixture(autouse=True)(nothing_foreseen)
 TRIALS = 4000
