@@ -363,8 +363,20 @@ class CutSheet:
             ahead = head and ((2 * filled[-1] < numbers[-1] and not grouped) or texts[0].endswith(":") or filled == [0])
             if apart or ahead or any(f is not None and f[1] < 1 for f in self.figures[row]):
                 break
+            if head and self._titles_above(row, filled, head, numbers):
+                break
             head.insert(0, row)
         return head
+
+    def _titles_above(self, row: int, filled: Sequence[int], head: Sequence[int], numbers: Sequence[int]) -> bool:
+        """Whether a row that fills the first cells alone is of titles, above heads that name each column already."""
+        paths = self._paths(head)
+        names = [text for k in numbers if (text := heading(paths[k]))]
+        packed = filled == [*range(len(filled))] and 1 < len(filled) < sum(any(path) for path in paths)
+        if not packed or len({*names}) < len(numbers):
+            return False
+        texts = [self.text(row, k) for k in filled]
+        return not all(self._says_role(text) or unit_of([text]) or hint(text, lengths=True) for text in texts)
 
     def _paths(self, head: Sequence[int]) -> list[list[str]]:
         """Texts above each column; a text of an upper row stands over the columns up to the next one of it or above it."""
