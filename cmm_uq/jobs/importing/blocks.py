@@ -94,6 +94,10 @@ class CutSheet:
         """Whether a row says the place of a line."""
         return places.said_in([self.line(i)], self.sign).whole
 
+    def titled(self, i: int) -> bool:
+        """Whether a row is the title of a line, or says where one lies."""
+        return self._names_line(i) or self.place(i)
+
     def line(self, row: int) -> str:
         return " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
 

@@ -14,9 +14,10 @@ from cmm_uq.jobs.importing.blocks import CutSheet, heading
 from cmm_uq.jobs.importing.columns import LARGEST_MACHINE_MM
 from cmm_uq.jobs.importing.factors import LINE, RUN, hint, says_of
 from cmm_uq.jobs.importing.format import UNITS, Cell, NotReadError, Sources, sources_of
-from cmm_uq.jobs.importing.header import plain_words, words_of
+from cmm_uq.jobs.importing.header import WORD, plain_words, words_of
 from cmm_uq.jobs.importing.roles import SheetReading, said
 
+_NUMBERED = 0.8  # of rows
 _BRACKETS = re.compile(r"\([^)]*\)")
 _SEVERAL = re.compile(r"(?<![^\s])[+-]?\d+[.,]\d+\s+[+-]?\d+[.,]\d+(?!\S)")
 
@@ -59,7 +60,20 @@ def layout(grid: CutSheet, rows: list[int]) -> list[int]:
     common = Counter(k for own in most for k in own)
     needed = {k for k, n in common.items() if n > 0.6 * len(most)}
     near = [row for row in rows if len(signs[row] & needed) * 2 >= len(needed)]
-    return [row for row in near if needed <= signs[row] or not grid.other_quantity(row)]
+    near = [row for row in near if needed <= signs[row] or not grid.other_quantity(row)]
+    return [row for row in near if row not in _unnumbered(grid, near)]
+
+
+def _unnumbered(grid: CutSheet, rows: Sequence[int]) -> set[int]:
+    """Rows without a number in a column that numbers nearly all, and with a name of their own: results of those above."""
+    found = set[int]()
+    fine = (k for k in range(grid.width) if any((f := grid.figure(row, k)) and f[1] < 1 for row in rows))
+    for k in range(next(fine, 0)):  # ahead of what was measured
+        own = [row for row in rows if (f := grid.figure(row, k)) and f[1] >= 1]
+        bare = {row for row in rows if not grid.text(row, k) and WORD.search(" ".join(map(str, grid.sheet.rows[row])))}
+        if len(own) > _NUMBERED * len(rows) and len(own) + len(bare) == len(rows):
+            found |= bare
+    return found
 
 
 def of_feature(grid: CutSheet, row: int) -> bool:
@@ -75,8 +89,8 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     taken = rows | {r for one in readings for r in one.others}
     summed = {r for one in readings for r in one.summaries}
     heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
-    texts = [row for row in range(min(taken), last) if grid.kinds[row] == "text" and not grid.place(row)]
-    cells = (cell for row in (*taken, *texts) for cell in grid.sheet.rows[row])
+    texts = [row for row in range(min(taken), last) if grid.kinds[row] == "text" and not grid.titled(row)]
+    cells = (cell for row in (*rows, *texts) for cell in grid.sheet.rows[row])
     if any(isinstance(cell, str) and _SEVERAL.search(_BRACKETS.sub("", cell)) for cell in cells):
         return None  # cells that were not cut apart
     told = [header.shown(grid.sheet, row, header.SUMMARY) for row in sorted(grid.ends & taken - rows)]
@@ -114,6 +128,12 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
 def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[int], columns: Collection[int]) -> bool:
     """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
     cells, block = grid.sheet.rows[row], grid.block_of[row].rows
+    fine, whole_ = _always(grid, rows)
+    # words where every row that is read has a figure, or a name in place of its number
+    if any(WORD.search(grid.text(row, k)) and not grid.figure(row, k) for k in fine):
+        return True
+    if any(not grid.text(row, k) for k in whole_) and WORD.search(grid.line(row)):
+        return True
     if header.is_summary(cells) or is_void(cells, "void", "feature"):
         return True
     if row in below_deviations(grid, [row, *rows]) | below_angles(grid, [row, *rows]) or _of_preamble(
@@ -137,6 +157,13 @@ def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[in
         if not any(abs(value - one) <= 1.05 * step for one in sums):
             return False
     return True
+
+
+def _always(grid: CutSheet, rows: Collection[int]) -> tuple[list[int], list[int]]:
+    """Columns in which all rows that are read have figures with digits behind the point, and whole numbers ahead of those."""
+    full = [k for k in range(grid.width) if all(grid.figure(row, k) for row in rows)]
+    fine = [k for k in full if any((f := grid.figure(row, k)) and f[1] < 1 for row in rows)]
+    return fine, [k for k in full if k < min(fine, default=0)]
 
 
 def _of_preamble(grid: CutSheet, row: int, rows: Collection[int], columns: Collection[int]) -> bool:

@@ -39,8 +39,10 @@ def lines_and_runs(
     count, several, found = len(reference), bool(reference.max(initial=0) > 0), factors.varying(labels, lengths=True)
     of_lines = {f[0].sort for f in found if f[2] == LINE and not (several and fixes(reference, f[1]))}
     for k, (label, own, _) in enumerate(found if {"title", "column"} & of_lines else ()):
-        if label.sort == "head" and counting(label.values) and ("title" in of_lines or label.values[0][1:2].isdigit()):
-            found[k] = label, own, RUN  # M1, M2 are measurements of the line that is named
+        numbered = counting(label.values) and label.values[0][1:2].isdigit()
+        numbered |= "title" in of_lines and all(value[-1:].isdigit() for value in label.values)
+        if label.sort == "head" and numbered:
+            found[k] = label, own, RUN  # M1, M2 are measurements of the line that is named, and so are H1, R1, H2, R2
     found = [(f[0], f[1], RUN if _measurements(f, found) else f[2]) for f in found]
     found = [(f[0], f[1], LINE if f[2] is None and _says_places(f[0]) else f[2]) for f in found]
     lying = codes([*map(str, map(_PLACED.findall, stated))]) if stated else reference
