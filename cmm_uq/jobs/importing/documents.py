@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 _MEASUREMENT = ("FeatureMeasurement", "FeatureActual")  # as QIF 3 and as QIF 2 call them
 PLACED = tuple(f"{sort}{one}" for sort in ("Sphere", "Point", "Circle") for one in _MEASUREMENT)
+_LENGTHS = tuple(
+    f"{sort}CharacteristicMeasurement" for sort in ("Length", "DistanceBetween", "Distance", "LinearDistance", "Linear")
+)
 _DEEPEST = 40  # records within records
 _HIDDEN = ("script", "style")  # of a web page, as those within a text
 _WITHIN = ("a", "b", "br", "em", "i", "small", "span", "strong", "sub", "sup")
@@ -57,6 +60,9 @@ class Qif(Format):
             else:
                 others += local(element).endswith(_MEASUREMENT)
             beside += [own] * (len(rows) - len(beside))
+        if not rows and (found := _distances(root)):
+            heads = ["run", "name", "nominal", "measured"]
+            return sheets_of(found, heads, unit=length_unit(root, where), decimal=".")
         if not rows:
             problem = f"holds no measured sphere, point or circle, and {others} other features"
             fix = "Export the results with the measured features and their locations"
@@ -68,6 +74,26 @@ class Qif(Format):
         rows = [(sort, [*cells, *(one.get(k, "") for k in further)], line) for (sort, cells, line), one in of_all]
         heads = [*WITH_DIRECTION, *further]
         return without_results(sheets_of(rows, heads, unit=length_unit(root, where), decimal=".", facts=facts))
+
+
+def _distances(root: Element) -> list[Row]:
+    """Measured lengths and distances: run, name, nominal value and measured value of each characteristic."""
+    known = {one.get("id", ""): one for one in root.iter() if one.get("id")}
+
+    def of(element: Element | None, name: str) -> Element | None:
+        return None if element is None else known.get(child(element, name))
+
+    rows: list[Row] = []
+    for results in root.iter():
+        for one in results.iter() if local(results) == "MeasurementResults" else ():
+            if local(one) in _LENGTHS and child(one, "Value"):
+                item = of(one, "CharacteristicItemId")
+                nominal = of(item, "CharacteristicNominalId")
+                cells = ["" if element is None else child(element, name)
+                         for element, name in ((results, "Name"), (item, "Name"), (nominal, "TargetValue"))]  # fmt: skip
+                number_ = one.get("id", "")
+                rows.append(("", [*cells, child(one, "Value")], int(number_) if number_.isdigit() else 0))
+    return rows
 
 
 def length_unit(root: Element, where: str) -> str | None:

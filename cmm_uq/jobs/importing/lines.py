@@ -160,8 +160,9 @@ def place_of(text: str) -> tuple[Floats, Floats]:
     return start, direction
 
 
-_SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
+_SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::(?:\s.*)?"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
 _LINEAR, _TRIPLE = {"linear", "rtl", ""}, 3
+_HEADS = (("run",), ("target", "point"), ("error", "deviation", "data"))  # of the columns of a run
 _AGAIN, _SHOWN = "Export the runs anew", 40
 HEADINGS = [
     "measurement", "point", "repeat", *(f"{a}_mm" for a in AXES), "reading_um", *(f"read_{a}" for a in AXES),
@@ -223,6 +224,7 @@ class _Runs:
         self.targets: list[float] = []
         self.runs: dict[int, list[tuple[int, float, int]]] = {}
         section = part = ""
+        head, words = list[int](), list[str]()  # columns of runs, targets and deviations
         for number, line in enumerate(lines, 1):
             if not (text := line.strip()):
                 continue
@@ -232,10 +234,15 @@ class _Runs:
                 for match in filter(None, keys):
                     part = match[1].lower()
                     self.facts.setdefault(part, match[2].strip())
-            elif section in ("TARGET DATA", "TARGETDATA", "TARGETS") and part == "targets":
+            elif section in ("TARGET DATA", "TARGETDATA", "TARGETS") and part in ("targets", "target-count"):
                 self.targets += self._figures(text, f"{where} line {number}")
+            elif section == "DATA" and (words := text.lower().split())[0] == "run":
+                head = [words.index(next(filter(own.__contains__, words), words[-1])) for own in _HEADS]
+                part = "run target data"
             elif section in ("DEVIATIONS", "DATA") and part.startswith("run target data"):
-                figures = self._figures(text, f"{where} line {number}")
+                cells = text.split()
+                picked = [cells[k] for k in head if k < len(cells)] if head and len(cells) == len(words) else cells
+                figures = self._figures(" ".join(picked), f"{where} line {number}")
                 run, target, deviation = figures if len(figures) == _TRIPLE else (0.0, 0.0, 0.0)
                 if run % 1 or target % 1 or not 1 <= target <= len(self.targets):
                     raise CmmUqError("is no run, target and deviation", where=f"{where} line {number}", fix=_AGAIN)
@@ -269,7 +276,7 @@ class Rtl(TextReport):
     name, title = "rtl", say("Laser interferometer (RTL)")
     shows = (
         re.compile(r"^\s{0,9}TARGET(?: ?DATA|S)::", re.M),
-        re.compile(r"(?:^| ;)\s{0,9}Target-count\s{0,9}:", re.M),
+        re.compile(r"(?:^| ;)\s{0,9}Target-count\s{0,9}:", re.M | re.IGNORECASE),
     )
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:

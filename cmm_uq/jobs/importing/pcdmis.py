@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -29,6 +30,7 @@ _BELOW = {
 }
 _FIGURES = re.compile(r"^\s*(?P<axis>[A-Z][A-Z0-9]?)\s+(?:(?:RFS|MMC|LMC)\s+)?[-+\d.]", re.IGNORECASE)
 _CONDITION = re.compile(r"^\s*[A-Z]+\s+(RFS|MMC|LMC)\s", re.IGNORECASE)
+_NEARLY = 0.9  # of distances, whose names are of one form
 _FEW = 10  # times as many lengths, beside which places are of something else
 _NUMBER = re.compile(r"(?<!\S)(?:[-+]?\d*[.,]?\d+|[-+]?\d+[^\s\d.,]{1,3}\d+'\d+(?:[.,]\d+)?\")(?!\S)")
 
@@ -160,9 +162,11 @@ def _numbers_line(text: str) -> bool:
 def _lengths(found: Sequence[Dimension]) -> list[Row]:
     """Distances whose names number their line and their length, as ``LINE1_L2_RUN3``, with what is nominal and measured."""
     every = [one for one in found if "M" in one.rows]
-    forms = {re.sub(r"\d+", "0", one.name) for one in every}
-    if len(every) < 2 or len(forms) > 1 or forms.pop().count("0") not in (2, 3):
+    forms = Counter(re.sub(r"\d+", "0", one.name) for one in every)
+    form, count = forms.most_common(1)[0] if forms else ("", 0)
+    if count < max(2, _NEARLY * len(every)) or form.count("0") not in (2, 3):
         return []
+    every = [one for one in every if re.sub(r"\d+", "0", one.name) == form]  # and no form of a sphere beside them
     below = [_below(*one.rows["M"]) for one in every]
     return [
         ("", [one.name, own.get("NOMINAL", ""), own["MEAS"]], one.line) for one, own in zip(every, below, strict=True)
