@@ -26,6 +26,7 @@ _MARKS = {"+": 1, "-": -1, "−": -1, "↑": 1, "↓": -1, "→": 1, "←": -1}
 _PAIRS = tuple({forward: 1, back: -1} for forward, back in ("FB", "FR", "VR", "HR", "AR", "IV"))
 _TOKEN = re.compile(r"[^\W_]+")
 _GLUED = re.compile(r"(?<=\d)(?=[^\W\d_])|(?<=[^\W\d_])(?=\d)")
+_PAIRED = re.compile(r"(?<=[^\W\d_]\d)(?=[^\W\d_]\d)")  # as in L1R1_P2
 _SHORTENED = re.compile(r"[^\W\d_]{3,}(?=\.)")
 _DATED = 8  # digits of a date
 _CAMEL = re.compile(r"(?<=[a-zäöüéèà])(?=[A-Z])")
@@ -173,7 +174,9 @@ def says_of(text: str, *tables: str) -> bool:
 
 def parts_of(label: Label) -> list[Label]:
     """The parts of names that are alike but for words and numbers; else what is ahead of a last number, and that number."""
-    for cut in (str, lambda value: _CAMEL.sub(" ", _GLUED.sub(" ", value))):
+    paired = all(_PAIRED.search(value) for value in label.values) and len(_TOKEN.findall(label.values[0])) > 1
+    first = (lambda value: _PAIRED.sub(" ", value)) if paired else str
+    for cut in (first, lambda value: _CAMEL.sub(" ", _GLUED.sub(" ", value))):
         if len(_TOKEN.findall(cut(label.values[0]))) < 2:
             continue
         names = tuple(map(cut, label.values))
@@ -191,7 +194,7 @@ def parts_of(label: Label) -> list[Label]:
                     halves = [Label(before, values, "part")]
                 found += halves
             before = values[0] if len({*values}) == 1 and not values[0].isdigit() else ""
-        if len(found) > 1 or (found and cut is not str and found[0].values != label.values):
+        if len(found) > 1 or (found and cut is not first and found[0].values != label.values):
             return found
     last = [m for value in label.values if (m := re.fullmatch(r"(.*?[^\W\d_]*)[\W_]*(\d+)(\D*)", value))]
     if len(last) < len(label.values):

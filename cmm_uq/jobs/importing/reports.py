@@ -187,7 +187,7 @@ class Dmis(TextReport):
                 rows += [row] if row else []
                 others += row is None
         encoded = facts_of(encoding, "features_not_used", say("Features that are no place"), others)
-        if not rows and (found := distances_in(statements(lines, where), unit, encoded, where)):
+        if found := distances_in(statements(lines, where), unit, encoded, where):
             return found
         if not rows:
             counted = f"{others} actual features, none of them a sphere, point or circle"

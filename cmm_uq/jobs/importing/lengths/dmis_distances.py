@@ -9,6 +9,7 @@ from cmm_uq.base.files.csv_table import number_problem
 from cmm_uq.jobs.importing.format import Cell, Fact, NotReadError, Sheet
 
 _TOLERANCE = re.compile(r"^T(?P<actual>A)?\s*\((?P<name>[^)]*)\)\s*=\s*TOL\s*/\s*DISTB\s*,(?P<rest>.*)$", re.IGNORECASE)
+_NEAR = 0.1  # in the unit of the file, within which what was measured is of a nominal distance of another name
 _TEXT = re.compile(r"^TEXT\s*/\s*OUTFIL\s*,\s*'(?P<text>[^']*)'", re.IGNORECASE)
 
 
@@ -29,12 +30,15 @@ def distances_in(
         if not figures or number_problem(figures[0]):
             raise NotReadError("has no figure", where=f"{where} line {line}", fix="Export it again")
         if not match["actual"]:
-            nominal |= {match["name"]: figures[0]} if words[0].upper() == "NOMINL" else {}
+            if words[0].upper() == "NOMINL" and not number_problem(figures[0]):
+                nominal[match["name"]] = figures[0]
             continue
-        if match["name"] not in nominal:
+        near = [own for own, value in nominal.items() if abs(float(value) - float(figures[0])) < _NEAR]
+        name = match["name"] if match["name"] in nominal else near[0] if len(near) == 1 else ""
+        if not name:  # of several lengths, one nominal distance each
             what = f"TA({match['name']}) has no nominal distance: T({match['name']})=TOL/DISTB,NOMINL,…"
             raise NotReadError(what, where=f"{where} line {line}", fix="Put the tolerances out with what is measured")
-        rows.append([match["name"], nominal.pop(match["name"]), figures[0]])
+        rows.append([match["name"], nominal[name], figures[0]])
         lines.append(line)
         count += 1
     return [Sheet("", rows, lines, unit=unit, decimal=".", facts=facts)] if count else []

@@ -39,6 +39,7 @@ _NAMED = (
     re.compile(rf"\bi\s*[=:]\s*({_PLAIN})\W{{1,3}}j\s*[=:]\s*({_PLAIN})\W{{1,3}}k\s*[=:]\s*({_PLAIN})", re.I),
     re.compile(rf"\bX({_PLAIN})[ ,;/]{{1,3}}Y({_PLAIN})[ ,;/]{{1,3}}Z({_PLAIN})(?!\w)"),
 )
+_GLUED = re.compile(rf"(?<![\w.,-])([XYZ])({_PLAIN})[ ,;/]{{1,3}}([XYZ])({_PLAIN})(?!\w|[.,]?\d| ?[XYZ]\d)")
 _ALL_AXES = re.compile(r"(?:X\W{0,3}Y\W{0,3}Z|\bI\W{1,3}J\W{1,3}K)\W{0,3}(?:\([^)\d]*\))?\W{0,5}$", re.I)
 _AXIS = re.compile(r"(?<![A-Za-zÀ-ɏ])([+-]?)([XYZ]+)(?![A-Za-zÀ-ɏ\d]|\s*[=:]?\s*[+-]?\d)")
 _ARROW = re.compile(r"(?:→|->|=>|~|–|—|\.\.)\s*$")
@@ -191,6 +192,10 @@ def _figures(text: str, sign: str, planes: frozenset[str] = frozenset()) -> list
     for match in (match for pattern in _NAMED for match in pattern.finditer(text)):
         own = {axis: _value(one, sign) or 0.0 for axis, one in zip("XYZ", match.groups(), strict=True)}
         found.append((match.start(), match.end(), own, None))
+    for match in _GLUED.finditer(text):
+        own = {match[k]: _value(match[k + 1], sign) or 0.0 for k in (1, 3)}
+        if len(own) > 1 and not any(a < match.end() and match.start() < b for a, b, *_ in found):
+            found.append((match.start(), match.end(), own, None))
     for match in _BRACKET.finditer(text):
         if (three := _three(match[1], sign)) is not None:
             found.append((match.start(), match.end(), dict(zip("XYZ", three, strict=True)), None))

@@ -20,6 +20,7 @@ from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, 
 _MOST_OF_A_TURN = 300
 _DEGREES = re.compile(r"°|度|\b(?:deg|gra[dus]|stop|stup)", re.IGNORECASE)
 _FEWEST = 3  # targets of an axis
+_WIDER = 20  # times, that targets are farther apart than their deviations
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
 
 
@@ -98,6 +99,9 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     if any(not c.counts for c in called) or (called and not any(c.step < 1 for c in large)):
         return min(called, key=lambda c: (c.counts, not c.round))  # and not their numbers, nor what was reached
     large = [c for c in large if c.role in (None, "measured", "reference") and not c.counts]
+    spans = [float(np.ptp(c.values[np.isfinite(c.values)])) for c in columns if not c.counts]
+    if large and sum(span * _WIDER > max(spans) for span in spans) == 1:
+        return max(large, key=lambda c: float(np.ptp(c.values[np.isfinite(c.values)])))  # beside deviations alone
     near = [c for c in large if any(o is not c and like(c.values + 1000, o.values + 1000) for o in large)]
     alone = [c for c in near if not way_of(c.heading)]
     if len(alone) == 1 and len(near) > 2:

@@ -60,7 +60,11 @@ def turned(grid: CutSheet) -> Sheet | None:
             names = [text for row in (*part.over, *part.beside) if (text := grid.text(row, k))] or [above[k]] * several
             texts = [grid.text(row, k) for row in (*part.over, *part.rows)]
             texts[: len(part.over)] = [""] * len(part.over)
-            texts[len(part.over) + 1 :] = [text_of(one) for one in filled_down(texts[len(part.over) + 1 :])]
+            below = [text_of(one) for one in filled_down(texts[len(part.over) + 1 :])]
+            # what holds on ends where something new begins ahead of it
+            anew = [any(grid.text(row, j) for j in range(k)) for row in part.rows[1:]]
+            given = texts[len(part.over) + 1 :]
+            texts[len(part.over) + 1 :] = ["" if new and not own else one for new, own, one in zip(anew, given, below, strict=True)]
             texts[len(part.over)] = part.name if several or not any(above) else above[k]
             named = f"{names[0]} {{}}" if names else "({})"
             line = bool(names) and hint(names[0], lengths=True) == LINE and len({*texts[len(part.over) + 1 :]}) > 1
