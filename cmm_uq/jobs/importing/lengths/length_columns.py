@@ -43,6 +43,7 @@ def lengths_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
     if len(columns) > WIDEST:
         return None
     _fill_down(columns)
+    columns = _in_micrometres(columns)
     groups: list[list[FigureColumn]] = []
     for one in filter(_sized, columns):
         fars = [_FAR if one.role and group[0].role else 0.04 for group in groups]
@@ -73,6 +74,21 @@ def _fill_down(columns: Sequence[FigureColumn]) -> None:
         )
         if evenly or any(np.nanmin(filled) > 0 and like(filled, o.values) for o in near):
             one.values = filled
+
+
+def _in_micrometres(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
+    """Columns, with deviations relative to a length as what they are of the only one beside them."""
+    bases = [c for c in columns if c.role in BASES and c.may_be_length and not c.minute]
+    if len(bases) != 1 or any(c.role == "deviation" and c.may_be_length for c in columns):
+        return [*columns]
+    metres = bases[0].values * (bases[0].unit or UNITS["mm"]).metres
+    step = float(np.nanmax(metres))
+    return [
+        replace(c, values=c.values * metres, step=c.step * step, unit=UNITS["um"])
+        if c.unit == UNITS["ppm"] and c.role != "summary"
+        else c
+        for c in columns
+    ]
 
 
 def _sized(column: FigureColumn) -> bool:
