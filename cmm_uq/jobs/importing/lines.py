@@ -160,7 +160,10 @@ def place_of(text: str) -> tuple[Floats, Floats]:
     return start, direction
 
 
-_SECTION, _KEY = re.compile(r"([A-Z][A-Z -]{0,40})::(?:\s.*)?"), re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})")
+_SECTION, _KEY = (
+    re.compile(r"([A-Z][A-Z -]{0,40})::(?:\s.*)?"),
+    re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})"),
+)
 _LINEAR, _TRIPLE = {"linear", "rtl", ""}, 3
 _HEADS = (("run",), ("target", "point"), ("error", "deviation", "data"))  # of the columns of a run
 _AGAIN, _SHOWN = "Export the runs anew", 40

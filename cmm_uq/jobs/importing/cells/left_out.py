@@ -17,7 +17,7 @@ from cmm_uq.jobs.importing.format import UNITS, Cell, NotReadError, Sources, sou
 from cmm_uq.jobs.importing.header import WORD, plain_words, words_of
 from cmm_uq.jobs.importing.roles import SheetReading, said
 
-_NUMBERED = 0.8  # of rows
+_NUMBERED = 0.6  # of rows
 _BRACKETS = re.compile(r"\([^)]*\)")
 _SEVERAL = re.compile(r"(?<![^\s])[+-]?\d+[.,]\d+\s+[+-]?\d+[.,]\d+(?!\S)")
 
@@ -128,13 +128,7 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
 def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[int], columns: Collection[int]) -> bool:
     """Whether a row is void or a summary by its words or by arithmetic, or has none of the columns that are read."""
     cells, block = grid.sheet.rows[row], grid.block_of[row].rows
-    fine, whole_ = _always(grid, rows)
-    # words where every row that is read has a figure, or a name in place of its number
-    if any(WORD.search(grid.text(row, k)) and not grid.figure(row, k) for k in fine):
-        return True
-    if any(not grid.text(row, k) for k in whole_) and WORD.search(grid.line(row)):
-        return True
-    if header.is_summary(cells) or is_void(cells, "void", "feature"):
+    if _of_results(grid, row, rows) or header.is_summary(cells) or is_void(cells, "void", "feature"):
         return True
     if row in below_deviations(grid, [row, *rows]) | below_angles(grid, [row, *rows]) or _of_preamble(
         grid, row, rows, columns
@@ -159,11 +153,14 @@ def _known(grid: CutSheet, row: int, figures: Sequence[int], rows: Collection[in
     return True
 
 
-def _always(grid: CutSheet, rows: Collection[int]) -> tuple[list[int], list[int]]:
-    """Columns in which all rows that are read have figures with digits behind the point, and whole numbers ahead of those."""
-    full = [k for k in range(grid.width) if all(grid.figure(row, k) for row in rows)]
-    fine = [k for k in full if any((f := grid.figure(row, k)) and f[1] < 1 for row in rows)]
-    return fine, [k for k in full if k < min(fine, default=0)]
+def _of_results(grid: CutSheet, row: int, rows: Collection[int]) -> bool:
+    """Whether a row has words where all that are read have a figure, or a name and nothing where they have their number."""
+    full = [k for k in range(grid.width) if all(grid.figure(own, k) for own in rows)]
+    fine = [k for k in full if any((f := grid.figure(own, k)) and f[1] < 1 for own in rows)]
+    numbers = [k for k in full if k < min(fine, default=0)]
+    if any(WORD.search(grid.text(row, k)) and not grid.figure(row, k) for k in fine):
+        return True
+    return WORD.search(grid.line(row)) is not None and any(not grid.text(row, k) for k in numbers)
 
 
 def _of_preamble(grid: CutSheet, row: int, rows: Collection[int], columns: Collection[int]) -> bool:

@@ -27,6 +27,7 @@ _LEAST = 2.0  # of a length without a reference, in the unit of the file
 WIDEST = 100  # columns of a table of lengths
 _WITHIN = re.compile(r"(?<![\d.,])\d+[.,]\d+(?![\d.,]*\d)")  # figures in texts
 _AXIS = re.compile(r"(?<![A-Za-zÀ-ɏ])[XYZ](?![A-Za-zÀ-ɏ])")
+_NUMBERED = re.compile(r"[^\W\d_]{1,3}\W?\d{1,2}")  # heads of runs
 _LEAST_ROWS = 4  # in which no column is the mean of others by chance
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
@@ -253,6 +254,8 @@ def _plain(
         return near and not others and all(c.is_length or c.role == "measured" for c in source)
     every = all(c.named for c in source) or (len(group) == 2 and base.role is not None)
     every = every or (len(source) > 1 and all(c.minute for c in source) and side_by_side(source))
+    # columns that are numbered, near a reference and other wherever it comes again, as no calibration is
+    every = every or (len(source) > 1 and side_by_side(source) and all(evidence.scatters(c, base) for c in source))
     return bool(checked) or (base.named and every)
 
 
@@ -266,7 +269,8 @@ def side_by_side(columns: Sequence[FigureColumn]) -> bool:
     called = [all(hint(text, lengths=True) in ("line", "run") for text in texts) for texts in levels]
     known = [own for own, *known in zip(levels, counting, called, strict=True) if any(known)]
     each = [*zip(*known, strict=True)] if known else [()] * len(columns)
-    return all(len({*zip(each, own, strict=True)}) == len({*each}) for own in levels) and (bool(known) or not levels)
+    alike = all(len({*zip(each, own, strict=True)}) == len({*each}) for own in levels) and (bool(known) or not levels)
+    return alike or (len(columns) > 1 and all(_NUMBERED.fullmatch(c.heading) for c in columns))
 
 
 def _from_one(texts: Sequence[str]) -> bool:
@@ -311,8 +315,17 @@ def _deviations(
     source = summed_up(others) or source
     source = source or ((parted if side_by_side(parted) else counted_heads(parted)) if base.role else [])
     source = without_derived(source) or source
+    alike = [c for c in parted if c.role is None and c not in source and any(_of_one_sort(c, o) for o in source)]
+    alike = [c for c in without_derived([*source, *alike]) if c in alike]
+    if alike:  # measured as well, for all that is known: H1, R1, H2, R2 are, there and back
+        each = sorted([*source, *alike], key=lambda c: c.i)
+        source = each if side_by_side(each) else []
     once = len(np.unique(base.values)) == len(base.values)
     return [] if once and len(source) == 1 and len(free) < len(small) and base.round else source  # as certificates are
+
+
+def _of_one_sort(a: FigureColumn, b: FigureColumn) -> bool:
+    return (a.unit, a.step, a.full) == (b.unit, b.step, b.full)
 
 
 def _unit_by(small: WrittenUnit, factor: float) -> WrittenUnit | None:

@@ -100,8 +100,9 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
         return min(called, key=lambda c: (c.counts, not c.round))  # and not their numbers, nor what was reached
     large = [c for c in large if c.role in (None, "measured", "reference") and not c.counts]
     spans = [float(np.ptp(c.values[np.isfinite(c.values)])) for c in columns if not c.counts]
-    if large and sum(span * _WIDER > max(spans) for span in spans) == 1:
-        return max(large, key=lambda c: float(np.ptp(c.values[np.isfinite(c.values)])))  # beside deviations alone
+    bare = [c for c in large if c.role is None and np.ptp(c.values[np.isfinite(c.values)]) == max(spans)]
+    if bare and sum(span * _WIDER > max(spans) for span in spans) == 1:
+        return bare[0]  # beside deviations alone
     near = [c for c in large if any(o is not c and like(c.values + 1000, o.values + 1000) for o in large)]
     alone = [c for c in near if not way_of(c.heading)]
     if len(alone) == 1 and len(near) > 2:

@@ -8,7 +8,7 @@ import numpy as np
 
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.jobs.importing.blocks import CutSheet
-from cmm_uq.jobs.importing.factors import LINE, RUN, hint
+from cmm_uq.jobs.importing.factors import LINE, RUN, hint, way_of
 from cmm_uq.jobs.importing.format import Cell, Sheet
 from cmm_uq.jobs.importing.header import filled_down, text_of
 from cmm_uq.jobs.importing.lengths.length_columns import BASES
@@ -55,7 +55,9 @@ def turned(grid: CutSheet) -> Sheet | None:
         several = sum(map(bool, above)) > 1  # then each names what stands below it, and none the row
         if several and not part.name and RUN in {hint(text, lengths=True) for text in above}:
             fine = any((grid.figure(base, k) or (0, 1))[1] < _COARSE for k in part.columns)
-            part.name = "reference" if fine else "nominal"  # figures among heads are what the lengths are called by
+            sensed = any(way_of(grid.text(row, k)) for row in part.rows[1:] for k in range(first))
+            # figures among heads are what the lengths are called by
+            part.name = "target" if sensed else "reference" if fine else "nominal"
         for k in range(first):  # what stands ahead of rows becomes the head of columns
             names = [text for row in (*part.over, *part.beside) if (text := grid.text(row, k))] or [above[k]] * several
             texts = [grid.text(row, k) for row in (*part.over, *part.rows)]
@@ -64,7 +66,9 @@ def turned(grid: CutSheet) -> Sheet | None:
             # what holds on ends where something new begins ahead of it
             anew = [any(grid.text(row, j) for j in range(k)) for row in part.rows[1:]]
             given = texts[len(part.over) + 1 :]
-            texts[len(part.over) + 1 :] = ["" if new and not own else one for new, own, one in zip(anew, given, below, strict=True)]
+            texts[len(part.over) + 1 :] = [
+                "" if new and not own else one for new, own, one in zip(anew, given, below, strict=True)
+            ]
             texts[len(part.over)] = part.name if several or not any(above) else above[k]
             named = f"{names[0]} {{}}" if names else "({})"
             line = bool(names) and hint(names[0], lengths=True) == LINE and len({*texts[len(part.over) + 1 :]}) > 1

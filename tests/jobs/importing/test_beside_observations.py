@@ -1,0 +1,177 @@
+"""What stands around observations is none of them: titles, results and remarks; and what formats call lengths."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.lines import MeasuredLengths, UnplacedRunsError
+from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, imported
+
+TARGETS = (0, 1000, 2000)
+RUNS = ((-1.1, 0.4, 6.6), (1.0, 2.5, 8.0), (-2.1, 0.1, 6.0), (1.5, 2.7, 8.1))
+
+
+def lengths(text: str, name: str = "x.csv") -> MeasuredLengths:
+    with pytest.raises(UnplacedError) as error:
+        imported(text.encode(), name, ImportKeys())
+    return error.value.lengths[0]
+
+
+def runs(text: str, axis: str, name: str = "x.csv") -> ImportedTable:
+    with pytest.raises(UnplacedRunsError) as error:
+        imported(text.encode(), name, ImportKeys())
+    assert error.value.names == [axis]
+    return imported(text.encode(), name, ImportKeys(lines={axis: f"along {axis} from 0,0,0"}))
+
+
+def told(table: ImportedTable, key: str) -> str:
+    return next((str(fact.value) for fact in table.recognised.facts if fact.key == key), "")
+
+
+@pytest.mark.parametrize("title", ["ISO 230-2 X axis;machine M 12;laser XL-80", "Machine M 12;tested by A. B."])
+def test_a_row_of_titles_with_separators_is_no_part_of_the_head(title: str) -> None:
+    rows = [f"{k // 2 + 1};{'+-'[k % 2]};{t};{v}" for k, run in enumerate(RUNS)
+            for t, v in list(zip(TARGETS, run, strict=True))[:: 1 - 2 * (k % 2)]]  # fmt: skip
+    text = "\n".join(["Axis X", title, "Run;Direction;Target mm;Deviation um", *rows, ""])
+    found = runs(text, "X")
+    np.testing.assert_allclose(found.columns["reading_um"][:6], [-1.1, 0.4, 6.6, 8.0, 2.5, 1.0])
+
+
+def test_targets_in_a_row_with_thousands_and_means_below_their_runs() -> None:
+    named = [("1", "↑"), ("", "↓"), ("2", "↑"), ("", "↓")]
+    rows = [
+        f"{n};{way};" + ";".join(f"{v:.1f}".replace(".", ",") for v in run)
+        for (n, way), run in zip(named, RUNS, strict=True)
+    ]
+    means = [np.mean(RUNS[k::2], axis=0) for k in (0, 1)]
+    below = [
+        f"x̄{way};;" + ";".join(f"{v:.2f}".replace(".", ",") for v in own) for way, own in zip("↑↓", means, strict=True)
+    ]
+    head = "Run;Richting;" + ";".join(("0,000", "1.000,000", "2.000,000"))
+    found = runs(
+        "\n".join(["Positioneerafwijking Y-as", ";;Doelpositie (mm)", head, ";;afwijking in µm", *rows, *below, ""]),
+        "Y",
+    )
+    assert (len(found.lines), {*found.columns["y_mm"].tolist()}) == (12, {0.0, 1000.0, 2000.0})
+    assert sorted(found.columns["reading_um"].tolist()) == sorted(v for run in RUNS for v in run)
+
+
+def of_styli(result: str) -> str:
+    rng = np.random.default_rng(1)
+    rows = []
+    for stylus in ("A0 B0", "A90 B0"):
+        way = rng.normal(size=(6, 3))
+        xyz = (300, 200, 100) + 12.5 * way / np.linalg.norm(way, axis=1)[:, None]
+        rows += [";".join([stylus if k == 1 else "", str(k), *(f"{c:.4f}" for c in p)]) for k, p in enumerate(xyz, 1)]
+        rows += [f"{stylus} merkez;;300.0002;199.9998;{100.0001 if result else ''}", f"{stylus} çap;;24.9998;1.4"]
+    return "\n".join(["Uç;Nokta;X (mm);Y (mm);Z (mm)", *rows, ""])
+
+
+@pytest.mark.parametrize("result", ["place", ""])
+def test_a_centre_and_a_diameter_below_numbered_points_are_left_out_and_told(result: str) -> None:
+    found = imported(of_styli(result).encode(), "x.csv", ImportKeys())
+    assert len(found.lines) == 12
+    assert all(f"line {line}" in told(found, "left_out") for line in (8, 9, 16, 17))
+
+
+def test_a_length_with_a_word_in_place_of_one_reading_loses_that_reading_alone() -> None:
+    rows = [f"{line};{n};{n + 0.0004 + k / 10000:.4f};{n - 0.0003 * k:.4f};"
+            f"{'n/d' if (line, n) == ('Z', 400.0) else f'{n + 0.0009 - k / 5000:.4f}'}"
+            for k, line in enumerate("XYZ") for n in (100.0, 250.0, 400.0)]  # fmt: skip
+    found = lengths("\n".join(["Axe;Valeur étalon (mm);Lecture 1 (mm);Lecture 2 (mm);Lecture 3 (mm)", *rows, ""]))
+    assert len(found.names) == 26
+
+
+def test_rows_of_words_between_figures_and_runs_there_and_back_in_heads() -> None:
+    each = [(100.0, 0.4, 0.9, 0.1, 0.8), (250.0, -0.2, 0.3, -0.6, 0.5), (400.0, 1.1, 1.9, 0.7, 1.4)]
+    text = "Laengen in MM   Abweichungen in UM    H = Hinlauf  R = Ruecklauf\n"
+    for p, line in enumerate(("LINIE 1 : XPAR", "LINIE 2 : YPAR")):
+        text += f"\n {line}  ( 1.000  0.000  0.000)\n  ST  KALIBRIERWERT      H1      R1      H2      R2\n"
+        text += "".join(
+            f"{k:4d} {row[0]:14.5f}" + "".join(f"{v + p * (k - 1.5):8.2f}" for v in row[1:]) + "\n"
+            for k, row in enumerate(each, 1)
+        )
+        text += "      GESAMT        MIN  -0.60  MAX    1.90   GRENZE 1.1 + L/800\n"
+    found = lengths(text, "x.lis")
+    assert ({*found.repeat}, len({*found.names})) == ({1, 2, 3, 4}, 2)
+    assert found.measured[:4] == pytest.approx([100.0004, 100.0009, 100.0001, 100.0008], abs=1e-9)
+    assert len(found.left_out) >= 2
+
+
+def test_errors_relative_to_the_length_are_of_it() -> None:
+    rows = [
+        f"{axis};{n};{a + k / 5:.2f};{b - k * n:.2f}"
+        for k, axis in enumerate("XY")
+        for n, a, b in ((0.4, 1.07, 2.61), (0.8, 2.03, -2.42), (1.2, 2.35, 1.68))
+    ]
+    found = lengths("\n".join(["轴;标称长度/m;相对示值误差/ppm 第1次;相对示值误差/ppm 第2次", *rows, ""]))
+    assert found.measured[:4] == pytest.approx([400.000428, 400.001044, 800.001624, 799.998064], abs=1e-9)
+
+
+QIF = """<?xml version="1.0"?><QIFDocument xmlns="http://qifstandards.org/xsd/qif3" versionQIF="3.0.0">
+<FileUnits><PrimaryUnits><LinearUnit><SIUnitName>meter</SIUnitName><UnitName>mm</UnitName>
+<UnitConversion><Factor>0.001</Factor></UnitConversion></LinearUnit></PrimaryUnits></FileUnits><Characteristics><CharacteristicNominals>{nominals}</CharacteristicNominals>
+<CharacteristicItems>{items}</CharacteristicItems></Characteristics><MeasurementsResults>{runs}</MeasurementsResults></QIFDocument>"""
+
+
+def test_length_characteristics_of_qif_are_lengths() -> None:
+    known = {1: 40.0, 2: 100.0, 3: 200.0}
+    nominals = "".join(f'<LengthCharacteristicNominal id="{k}"><TargetValue>{v}</TargetValue></LengthCharacteristicNominal>'
+                       for k, v in known.items())  # fmt: skip
+    items = "".join(f'<LengthCharacteristicItem id="{k}{p}"><Name>GB{v:.0f}_{"AB"[p]}</Name>'
+                    f"<CharacteristicNominalId>{k}</CharacteristicNominalId></LengthCharacteristicItem>"
+                    for k, v in known.items() for p in (0, 1))  # fmt: skip
+    each = "".join(
+        f'<MeasurementResults id="9{run}"><Name>Run {run}</Name><MeasuredCharacteristics><CharacteristicMeasurements>'
+        + "".join(f'<LengthCharacteristicMeasurement id="8{run}{k}{p}"><CharacteristicItemId>{k}{p}</CharacteristicItemId>'
+                  f"<Value>{v + run / 10000 + p / 1000:.4f}</Value></LengthCharacteristicMeasurement>"
+                  for k, v in known.items() for p in (0, 1))
+        + "</CharacteristicMeasurements></MeasuredCharacteristics></MeasurementResults>" for run in (1, 2)
+    )  # fmt: skip
+    found = lengths(QIF.format(nominals=nominals, items=items, runs=each), "x.qif")
+    assert ({*found.names}, {*found.repeat}) == ({"A", "B"}, {1, 2})
+    assert found.reference[:2] == [40.0, 40.0]
+    assert found.measured[:2] == pytest.approx([40.0001, 40.0011], abs=1e-9)
+
+
+def test_a_form_beside_distances_of_pc_dmis_is_no_length() -> None:
+    def dimension(name: str, of: str, nominal: float, measured: float) -> str:
+        return (f"DIM {name}= {of}  UNITS=MM\nAX     NOMINAL      +TOL      -TOL      MEAS       DEV    OUTTOL\n"
+                f"M   {nominal:10.4f}    0.0020    0.0020{measured:10.4f}{measured - nominal:10.4f}    0.0000\n")  # fmt: skip
+
+    body = [dimension(f"P{p}_L{k}_R{r}", "3D DISTANCE FROM POINT A TO POINT B", 100.0 * k, 100.0 * k + r / 10000)
+            for p in (1, 2) for k in (1, 2, 3) for r in (1, 2)]  # fmt: skip
+    body += [dimension("FORM1", "SPHERICITY OF SPHERE SPH_REF", 0.0, 0.0013)]
+    found = lengths("PART NAME  : E0\n\n" + "".join(body), "x.txt")
+    assert ({*found.names}, len(found.names)) == ({"P1", "P2"}, 12)
+
+
+def test_tolerances_of_a_dmis_output_with_names_of_their_own_are_found_by_their_distance() -> None:
+    text = "DMISMN/'E0',05.3\nUNITS/MM,ANGDEC\n"
+    text += "".join(f"T(T_L{k})=TOL/DISTB,NOMINL,{120.0 * k},-0.002,0.002,PT2PT\n" for k in (1, 2, 3))
+    for line in (1, 2):
+        text += f"TEXT/OUTFIL,'LINE {line}'\n"
+        for run in (1, 2):
+            for k in (1, 2, 3):
+                at = f"{100 + 120.0 * k + run / 10000:.4f}"
+                text += f"FA(L{line}R{run}_P{k})=FEAT/POINT,CART,{at},200.001,-399.9995,1.0,0.0,0.0\n"
+                text += f"TA(L{line}R{run}_D{k})=TOL/DISTB,{120 * k + run / 10000:.5f},INTOL\n"
+    found = lengths(text, "x.dmo")
+    assert ({*found.names}, {*found.repeat}, len(found.names)) == ({"LINE 1", "LINE 2"}, {1, 2}, 12)
+    assert found.reference[1] == 240.0
+    with pytest.raises(CmmUqError, match="has no nominal distance"):
+        imported(text.replace("D3)=TOL/DISTB,360", "D3)=TOL/DISTB,365").encode(), "x.dmo", ImportKeys())
+
+
+def test_a_laser_run_by_numbers_of_targets() -> None:
+    rows = [f"{k + 1:3d} {i + 1:5d}     {'+-'[k % 2]}  {run[i]:8.2f}" for k, run in enumerate(RUNS)
+            for i in list(range(3))[:: 1 - 2 * (k % 2)]]  # fmt: skip
+    text = ("HEADER:: LASER DATA\nFile-Type: Linear\nAxis: Y\nLocation: X315 Z400\n\nTARGETS::\nTarget-Count: 3\n"
+            "    0.0000   1000.0000   2000.0000\n\nDATA::\nRun  Target   Dir      Error\n" + "\n".join(rows)
+            + "\n\nSTATISTICS:: ISO 230-2\nE: 9.41  M: 7.27\nEOF\n")  # fmt: skip
+    found = imported(text.encode(), "x.rtl", ImportKeys(lines={"Y": "along Y from 315,0,400"}))
+    np.testing.assert_allclose(found.columns["reading_um"][3:6], [8.0, 2.5, 1.0])
+    assert {*found.columns["approach_y"].tolist()} == {1.0, -1.0}
