@@ -20,6 +20,7 @@ from cmm_uq.base.units import UNITS as PRINTED
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.encodings import begins_with, decoded, head_text, local, root_of
 from cmm_uq.jobs.importing.format import DCC, LENGTHS, UNITS, Cell, Fact, Format, ImportKeys, Row, Sheet, sheets_of
+from cmm_uq.jobs.importing.lengths.qif_lengths import lengths_of_qif
 from cmm_uq.jobs.importing.reports import WITH_DIRECTION, facts_of, without_results
 
 if TYPE_CHECKING:
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
 
 _MEASUREMENT = ("FeatureMeasurement", "FeatureActual")  # as QIF 3 and as QIF 2 call them
 PLACED = tuple(f"{sort}{one}" for sort in ("Sphere", "Point", "Circle") for one in _MEASUREMENT)
-_LENGTHS = tuple(
-    f"{sort}CharacteristicMeasurement" for sort in ("Length", "DistanceBetween", "Distance", "LinearDistance", "Linear")
-)
 _DEEPEST = 40  # records within records
 _HIDDEN = ("script", "style")  # of a web page, as those within a text
 _WITHIN = ("a", "b", "br", "em", "i", "small", "span", "strong", "sub", "sup")
@@ -60,7 +58,7 @@ class Qif(Format):
             else:
                 others += local(element).endswith(_MEASUREMENT)
             beside += [own] * (len(rows) - len(beside))
-        if not rows and (found := _distances(root)):
+        if not rows and (found := lengths_of_qif(root)):
             heads = ["run", "name", "nominal", "measured"]
             return sheets_of(found, heads, unit=length_unit(root, where), decimal=".")
         if not rows:
@@ -74,26 +72,6 @@ class Qif(Format):
         rows = [(sort, [*cells, *(one.get(k, "") for k in further)], line) for (sort, cells, line), one in of_all]
         heads = [*WITH_DIRECTION, *further]
         return without_results(sheets_of(rows, heads, unit=length_unit(root, where), decimal=".", facts=facts))
-
-
-def _distances(root: Element) -> list[Row]:
-    """Measured lengths and distances: run, name, nominal value and measured value of each characteristic."""
-    known = {one.get("id", ""): one for one in root.iter() if one.get("id")}
-
-    def of(element: Element | None, name: str) -> Element | None:
-        return None if element is None else known.get(child(element, name))
-
-    rows: list[Row] = []
-    for results in root.iter():
-        for one in results.iter() if local(results) == "MeasurementResults" else ():
-            if local(one) in _LENGTHS and child(one, "Value"):
-                item = of(one, "CharacteristicItemId")
-                nominal = of(item, "CharacteristicNominalId")
-                cells = ["" if element is None else child(element, name)
-                         for element, name in ((results, "Name"), (item, "Name"), (nominal, "TargetValue"))]  # fmt: skip
-                number_ = one.get("id", "")
-                rows.append(("", [*cells, child(one, "Value")], int(number_) if number_.isdigit() else 0))
-    return rows
 
 
 def length_unit(root: Element, where: str) -> str | None:

@@ -20,7 +20,16 @@ from cmm_uq.jobs.importing.cells.encodings import report_lines
 from cmm_uq.jobs.importing.reports import statements
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN
-from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstood, NotUnderstoodError, numbers_of, reference, words_of
+from cmm_uq.jobs.part.drawing import (
+    PROGRAMS,
+    Drawing,
+    Facts,
+    NotUnderstood,
+    NotUnderstoodError,
+    numbers_of,
+    reference,
+    words_of,
+)
 from cmm_uq.jobs.part.feature import ASKS, What
 
 MILLIMETRES = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FEET": 304.8}
@@ -30,19 +39,9 @@ KINDS = {name.upper(): name for name in ("point", "line", "plane", "circle", "sp
 NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
 
 # first words of statements that say nothing of what is measured, or that are read elsewhere
-PASSED = (
-    "DMISMN", "DMISMD", "DISPLY", "FILNAM", "PRCOMP", "SNSET", "SNSMNT", "OPEN", "CLOSE", "GOTO", "MODE", "TEXT", "SAVE",
-    "ENDFIL", "FEDRAT", "ACLRAT", "DECPL", "FINPOS", "RAPID", "FROM", "GOHOME", "CRSLCT", "TECOMP", "WKPLAN", "DEVICE",
-    "DID", "VFORM", "REPORT", "FLY", "BADTST", "CALIB", "UNITS", "ENDMES", "PTMEAS", "SCNSET", "SCNMOD", "PATH", "PAMEAS",
-    "GOTARG", "ENDGO", "CLMPID", "CLMPSN", "FIXTID", "FIXTSN", "OPERID", "PARTID", "PARTRV", "PARTSN", "PLANID", "PREVOP",
-    "PROCID", "LOTID", "DMEID", "DMESWI", "DMESWV", "MFGDEV",
-)  # fmt: skip
+PASSED = frozenset(PROGRAMS["dmis"]["passed"].split())
 
-_TOLERANCES: Mapping[str, What] = {
-    "FLAT": "flatness", "STRGHT": "straightness", "CIRLTY": "roundness", "CYLCTY": "cylindricity", "DIAM": "size",
-    "POS": "position", "PARLEL": "parallelism", "PERP": "perpendicularity", "CONCEN": "coaxiality",
-    "CRNOUT": "circular_runout", "TRNOUT": "total_runout",
-}  # fmt: skip
+_TOLERANCES: Mapping[str, What] = PROGRAMS["dmis"]["tolerances"]
 
 # words that change what a tolerance means, refused in words of their own
 _REFUSED: Mapping[str, str] = {

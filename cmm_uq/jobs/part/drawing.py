@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
@@ -30,6 +32,7 @@ from cmm_uq.jobs.part.feature import ASKS, CharacteristicFacts, FeatureFacts, Wh
 from cmm_uq.jobs.part.probed import Probed, probed
 
 Facts = dict[str, Any]
+PROGRAMS = tomllib.loads(Path(__file__).with_name("programs.toml").read_text(encoding="utf-8"))
 _DIGITS = 9  # decimals of a place or limit: a picometre, which the sum of a size and a deviation keeps
 _TOLD = 3  # reasons that are told where nothing is left
 ALL = "*"  # in place of names: everything that is not understood

@@ -19,38 +19,20 @@ from cmm_uq.jobs.importing.cells.encodings import local, root_of
 from cmm_uq.jobs.importing.documents import child, three
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN
-from cmm_uq.jobs.part.drawing import Facts, NotUnderstoodError, listed, number_of, text, whole_text
+from cmm_uq.jobs.part.drawing import PROGRAMS, Facts, NotUnderstoodError, listed, number_of, text, whole_text
 from cmm_uq.jobs.part.feature import ASKS, What, with_article
 
 PROGRAM = "QIF plan"
 _KINDS = ("Point", "Line", "Plane", "Circle", "Sphere", "Cylinder", "Cone")
-WHATS: Mapping[str, What] = {
-    "Diameter": "size", "SphericalDiameter": "size", "Straightness": "straightness", "Flatness": "flatness",
-    "Circularity": "roundness", "Cylindricity": "cylindricity", "Sphericity": "sphericity", "Position": "position",
-    "Parallelism": "parallelism", "Perpendicularity": "perpendicularity", "Angularity": "angularity",
-    "Coaxiality": "coaxiality", "CircularRunout": "circular_runout", "TotalRunout": "total_runout",
-    "DistanceBetween": "distance", "AngleBetween": "angle",
-}  # fmt: skip
-ASSOCIATIONS = {
-    "LEASTSQUARES": "least_squares", "MINMAX": "minimum_zone", "MAXINSCRIBED": "maximum_inscribed",
-    "MINCIRCUMSCRIBED": "minimum_circumscribed",
-}  # fmt: skip
+WHATS: Mapping[str, What] = PROGRAMS["qif"]["whats"]
+ASSOCIATIONS: Mapping[str, str] = PROGRAMS["qif"]["associations"]
 # kinds of characteristics that are refused in words of their own, by the beginning of the element's name
 _SORTS: Mapping[str, str] = {
     "PointProfile": refused.POINT_PROFILE, "LineProfile": refused.LINE_PROFILE,
     "SurfaceProfile": refused.SURFACE_PROFILE, "SurfaceProfileNonUniform": refused.SURFACE_PROFILE,
 }  # fmt: skip
 # elements that are read, or that leave the characteristic or the datum as it is
-_READ = (
-    "ToleranceValue", "Tolerance", "DatumReferenceFrameId", "MaterialCondition", "ZoneShape", "Attributes", "DimensionType",
-    "Name", "Description", "NonTolerance", "SeparateZone", "SizeCharacteristicDefinitionId",
-    "UUID", "QPId", "CharacteristicDefinitionId", "TargetValue", "Direction", "AnalysisMode", "AnalysisVector", "Angle",
-    "FeatureNominalIds", "FeatureNominalPairs", "CharacteristicDesignator", "CoordinateSystemId", "EntityInternalIds",
-    "EntityExternalIds", "NotedIds", "Notes", "ScopeIds", "WorkInstructions", "KeyCharacteristic", "TargetValueCalculation",
-    "FeatureItemIds", "CharacteristicNominalId", "NotableEventIds", "MeasurementDeviceIds", "LocationOnDrawing",
-    "VirtualMeasurement", "Dimensionality", "ZoneOrientationVector",
-    "Datum", "DatumDefinitionId", "MaterialModifier", "ReferencedComponent",  # of datums
-)  # fmt: skip
+_READ = frozenset(PROGRAMS["qif"]["read"].split())
 _NAMED: Mapping[str, str] = {
     "FreeState": refused.FREE_STATE,
     "ProjectedToleranceZone": refused.PROJECTED,
