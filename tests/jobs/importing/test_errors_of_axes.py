@@ -109,7 +109,7 @@ def test_straightness_is_no_position() -> None:
                 "Test title;Straightness vertical",
                 "Axis;Y",
                 "Error units;micrometres",
-                "Target;Run 1 (+);Run 1 (-)",
+                "Target;Run 1 (+);Run 1 (-);Run 2 (+);Run 2 (-)",
                 *rows,
             ]
         )

@@ -315,7 +315,7 @@ def _deviations(
     source = summed_up(others) or source
     source = source or ((parted if side_by_side(parted) else counted_heads(parted)) if base.role else [])
     source = without_derived(source) or source
-    alike = [c for c in parted if c.role is None and c not in source and any(_of_one_sort(c, o) for o in source)]
+    alike = [c for c in parted if c.role is None and c not in source and of_one_sort(c, source)]
     alike = [c for c in without_derived([*source, *alike]) if c in alike]
     if alike:  # measured as well, for all that is known: H1, R1, H2, R2 are, there and back
         each = sorted([*source, *alike], key=lambda c: c.i)
@@ -324,8 +324,9 @@ def _deviations(
     return [] if once and len(source) == 1 and len(free) < len(small) and base.round else source  # as certificates are
 
 
-def _of_one_sort(a: FigureColumn, b: FigureColumn) -> bool:
-    return (a.unit, a.step, a.full) == (b.unit, b.step, b.full)
+def of_one_sort(column: FigureColumn, source: Sequence[FigureColumn]) -> bool:
+    """Whether nothing but words tells a column from one that is read: its unit and its last digit are the same."""
+    return any((column.unit, column.step, column.full) == (c.unit, c.step, c.full) for c in source)
 
 
 def _unit_by(small: WrittenUnit, factor: float) -> WrittenUnit | None:

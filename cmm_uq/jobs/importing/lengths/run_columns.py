@@ -14,7 +14,7 @@ from cmm_uq.jobs.importing.coordinates import OF_CIRCLES
 from cmm_uq.jobs.importing.factors import RUN, hint, says_of, senses, way_of, ways_of
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, without_derived
-from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, settled_base
+from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, of_one_sort, settled_base
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like
 
 _MOST_OF_A_TURN = 300
@@ -53,8 +53,10 @@ def runs_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> She
         reading.checked = len(source)
     elif reached and not any(ways[c.i] for c in source):
         source, reading.positions = [replace(c, values=c.values - values) for c in reached], True
-    if not source or len({c.heading for c in source}) < len(source):
-        return None  # or of two instruments
+    left = [c for c in small if c.role is None and c.i not in {o.i for o in source} and of_one_sort(c, source)]
+    left = [] if reading.positions else [c for c in without_derived([*source, *left]) if c in left]
+    if not source or left or len({c.heading for c in source}) < len(source):
+        return None  # or of two instruments, or others were measured as well
     reading.taken = {"target": [target], "reading_um": source}
     reading.collect(grid, rows, columns, [c.i for c in reached])
     for k, row in enumerate(rows):
