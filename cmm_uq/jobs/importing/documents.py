@@ -321,7 +321,9 @@ def _nested(element: Element, where: str, depth: int) -> Any:
         inside.setdefault(local(one), []).append(_nested(one, where, depth + 1))
     if not inside and not element.attrib:
         return text
-    own: dict[str, Any] = {name.rpartition("}")[2]: value for name, value in element.attrib.items()}
+    named = ((name.rpartition("}")[2], value) for name, value in element.attrib.items())
+    # a number of something says by its element what it counts
+    own: dict[str, Any] = {f"{local(element)} {name}" if value.isdigit() else name: value for name, value in named}
     own |= {local(element): text} if text else {}
     for name, values in inside.items():
         plain = len(values) == 1 and not isinstance(values[0], dict)

@@ -138,6 +138,11 @@ def counting(values: Sequence[str]) -> bool:
     return len({*map(numberless, values)}) == 1
 
 
+def counts_ways(values: Sequence[str]) -> bool:
+    """Whether labels are of runs there and back, each a word for its sense and perhaps a number, as ``Hin 1``."""
+    return len({*map(way_of, values)} - {0}) == 2 and all(way_of(v) and len(plain_words(v)) < 3 for v in values)
+
+
 def numberless(text: str) -> str:
     """A text with one figure for each number, of whatever form, as I, II and IV."""
     return re.sub(r"\d+|\b(?:I{1,3}|IV|VI{1,3}|IX)\b", "0", unicodedata.normalize("NFKC", text))

@@ -15,7 +15,7 @@ import numpy as np
 
 from cmm_uq.jobs.importing.blocks import Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import figure, unit_of
-from cmm_uq.jobs.importing.factors import hint, numberless
+from cmm_uq.jobs.importing.factors import counts_ways, hint, numberless
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, WrittenUnit
 from cmm_uq.jobs.importing.lengths import evidence
 from cmm_uq.jobs.importing.lengths.evidence import Difference, differences, families, follows, without_derived
@@ -27,7 +27,7 @@ _LEAST = 2.0  # of a length without a reference, in the unit of the file
 WIDEST = 100  # columns of a table of lengths
 _WITHIN = re.compile(r"(?<![\d.,])\d+[.,]\d+(?![\d.,]*\d)")  # figures in texts
 _AXIS = re.compile(r"(?<![A-Za-zÀ-ɏ])[XYZ](?![A-Za-zÀ-ɏ])")
-_NUMBERED = re.compile(r"[^\W\d_]{1,3}\W?\d{1,2}")  # heads of runs
+_CODE = re.compile(r"[A-Z]{1,3}\W?\d{1,2}|[XYZ]{1,3}")  # of a run or a line, in a head
 _LEAST_ROWS = 4  # in which no column is the mean of others by chance
 _MANY = 3  # rows by which lengths without a reference are known for ones of an artefact
 
@@ -171,6 +171,10 @@ def _base(
         base = open_[0]
     elif base is None and open_ and len(group) > len(open_):
         return None
+    finer = [c for c in group if base is not None and not base.stated and c.step < base.step and follows(c, base)]
+    others = [c for c in group if c is not base and c not in named and c not in finer]
+    if base is not None and len(finer) == 1 and others and all(evidence.scatters(c, base) for c in others):
+        base = finer[0]  # the same wherever it comes again, as nothing that was measured is
     rest = [c for c in group if c is not base and (c not in named or (base is not None and evidence.scatters(c, base)))]
     rest = [c for c in rest if c.role == "measured" or base is None or c.step < min(1, 20 * base.step)]
     rest = [c for c in rest if c.role == "measured"] or [c for c in rest if base is None or not follows(c, base)]
@@ -252,7 +256,8 @@ def _plain(
         others = any(c.role in BASES and not c.counts for c in columns)
         near = bool(np.nanmedian(source[0].values) >= _LEAST) and all(like(source[0].values, c.values) for c in source)
         return near and not others and all(c.is_length or c.role == "measured" for c in source)
-    every = all(c.named for c in source) or (len(group) == 2 and base.role is not None)
+    lone = [c for c in group if c is not base and c.role not in BASES]
+    every = all(c.named for c in source) or (len(lone) == 1 and base.role is not None)
     every = every or (len(source) > 1 and all(c.minute for c in source) and side_by_side(source))
     # columns that are numbered, near a reference and other wherever it comes again, as no calibration is
     every = every or (len(source) > 1 and side_by_side(source) and all(evidence.scatters(c, base) for c in source))
@@ -266,11 +271,13 @@ def side_by_side(columns: Sequence[FigureColumn]) -> bool:
     """
     levels = [*zip(*(c.path for c in columns), strict=True)]
     counting = [len({_AXIS.sub("0", numberless(text)) for text in texts}) == 1 and _from_one(texts) for texts in levels]
+    counting = [known or counts_ways(texts) for known, texts in zip(counting, levels, strict=True)]
     called = [all(hint(text, lengths=True) in ("line", "run") for text in texts) for texts in levels]
     known = [own for own, *known in zip(levels, counting, called, strict=True) if any(known)]
     each = [*zip(*known, strict=True)] if known else [()] * len(columns)
     alike = all(len({*zip(each, own, strict=True)}) == len({*each}) for own in levels) and (bool(known) or not levels)
-    return alike or (len(columns) > 1 and all(_NUMBERED.fullmatch(c.heading) for c in columns))
+    coded = [{*texts} for texts in levels if len({*texts}) > 1]  # X, Y, Z, D1, D2 or H1, R1, H2, R2
+    return alike or (len(coded) == 1 and len(coded[0]) == len(columns) and all(map(_CODE.fullmatch, coded[0])))
 
 
 def _from_one(texts: Sequence[str]) -> bool:

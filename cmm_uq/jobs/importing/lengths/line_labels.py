@@ -40,6 +40,7 @@ def lines_and_runs(
     of_lines = {f[0].sort for f in found if f[2] == LINE and not (several and fixes(reference, f[1]))}
     for k, (label, own, _) in enumerate(found if {"title", "column"} & of_lines else ()):
         numbered = counting(label.values) and label.values[0][1:2].isdigit()
+        numbered |= factors.counts_ways(label.values)
         numbered |= "title" in of_lines and all(value[-1:].isdigit() for value in label.values)
         if label.sort == "head" and numbered:
             found[k] = label, own, RUN  # M1, M2 are measurements of the line that is named, and so are H1, R1, H2, R2
