@@ -138,6 +138,12 @@ def counting(values: Sequence[str]) -> bool:
     return len({*map(numberless, values)}) == 1
 
 
+def states_of(values: Sequence[str]) -> set[str]:
+    """States of the machine that labels name: as it was found, and as it was left."""
+    plain = {f" {' '.join(word for word in plain_words(value) if not word.isdigit())} " for value in values}
+    return {of for of, words in words_of("states").items() if any(f" {one} " in text for one in words for text in plain)}
+
+
 def counts_ways(values: Sequence[str]) -> bool:
     """Whether labels are of runs there and back, each a word for its sense and perhaps a number, as ``Hin 1``."""
     return len({*map(way_of, values)} - {0}) == 2 and all(way_of(v) and len(plain_words(v)) < 3 for v in values)

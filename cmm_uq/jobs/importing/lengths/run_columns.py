@@ -13,7 +13,7 @@ from cmm_uq.jobs.importing.blocks import Block, CutSheet
 from cmm_uq.jobs.importing.coordinates import OF_CIRCLES
 from cmm_uq.jobs.importing.factors import RUN, hint, says_of, senses, way_of, ways_of
 from cmm_uq.jobs.importing.format import NotReadError
-from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, without_derived
+from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, scatters, without_derived
 from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, of_one_sort, settled_base
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like
 
@@ -112,6 +112,8 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     small = [c for c in columns if c not in near and c.role != "summary"]
     if near and (base := settled_base(near, differences(near, small))) is not None:
         return base
+    if len(near) == len({"target", "reached"}) and (again := [c for c in near if any(scatters(o, c) for o in near)]):
+        return again[0]  # beside what was reached, which is another each time
     counting = [
         c for c in large if c.role == "measured" and hint(c.heading, lengths=True) == RUN
     ]  # ahead of runs across
