@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 from itertools import pairwise
 
@@ -138,10 +138,12 @@ def counting(values: Sequence[str]) -> bool:
     return len({*map(numberless, values)}) == 1
 
 
-def states_of(values: Sequence[str]) -> set[str]:
+def states_of(values: Collection[str]) -> set[str]:
     """States of the machine that labels name: as it was found, and as it was left."""
     plain = {f" {' '.join(word for word in plain_words(value) if not word.isdigit())} " for value in values}
-    return {of for of, words in words_of("states").items() if any(f" {one} " in text for one in words for text in plain)}
+    return {
+        of for of, words in words_of("states").items() if any(f" {one} " in text for one in words for text in plain)
+    }
 
 
 def counts_ways(values: Sequence[str]) -> bool:

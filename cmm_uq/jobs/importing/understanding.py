@@ -38,7 +38,7 @@ from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths
 from cmm_uq.jobs.importing.numbering import numbered_points
-from cmm_uq.jobs.importing.roles import SheetReading, each, joined, said_by
+from cmm_uq.jobs.importing.roles import SheetReading, each, joined, like, said_by
 
 _COMPARED = 5000  # points of sheets
 _AIRCRAFT = 100.0  # inches, that points which are none of an artefact may be apart
@@ -111,8 +111,8 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     grid = chosen[0][1]
     whole = joined([reading for reading, _ in chosen])
     if both := next((label for label in whole.every_label if len(states_of({*label.values})) > 1), None):
-        shown = ", ".join(map(repr, dict.fromkeys(both.values)))
-        what = f"{shown} are of a machine before and after it was adjusted, each a recording of its own"
+        quoted = ", ".join(map(repr, dict.fromkeys(both.values)))
+        what = f"{quoted} are of a machine before and after it was adjusted, each a recording of its own"
         raise NotReadError(what, where=where, fix="Name the columns of one of them, or export one of them")
     take_certified(whole, [*map(CutSheet, upright)])
     return Understanding(whole, sheets, without, grid, chosen, elsewhere, across=grid in across)
@@ -343,6 +343,9 @@ class Understanding:
         own, figures, place = self.reading, np.array(self.reading.figures), self.grid.at(self.header.row)
         lengths = lengths_of(figures[:, 0])
         stated = [one["place", ""] for one in own.labels]
+        if np.isnan(figures[:, 0]).all() and not like(figures[:, 1], figures[:1, 1]):
+            what = "its lengths are of several sizes, and no column says what each of them is of"
+            raise NotReadError(what, where=place, fix="Say which does: columns = { reference_mm = … }, or nominal_mm")
         lines, runs, used = lines_and_runs(own.every_label, lengths, place, stated)
         reference, measured = (formats.converted(one, unit, "length_mm") for one in figures.T)
         if own.deviations:

@@ -49,13 +49,26 @@ def scatters(measured: FigureColumn, base: FigureColumn) -> bool:
 
 
 def steady(measured: FigureColumn, deviation: FigureColumn) -> FigureColumn | None:
-    """The one reference of all rows, less which what was measured is the deviation beside it; ``None`` where it differs."""
+    """The references, of several rows each, less which what was measured is the deviation beside it; ``None`` of others."""
     for f in deviation.factors(measured):
         own, slack = measured.values - deviation.values * f, deviation.slack(measured, measured, f)
-        if len(own) >= _LEAST and np.ptp(own) <= 2 * slack and np.ptp(deviation.values * f) > 4 * slack:
-            value = round(float(np.median(own)), round(-np.log10(measured.step)))
-            return replace(measured, i=-1, values=np.full(len(own), value), role="reference")
+        if len(own) < _LEAST or not np.isfinite(own).all() or np.ptp(deviation.values * f) <= 4 * slack:
+            continue
+        order = np.argsort(own)
+        each = np.split(order, 1 + np.flatnonzero(np.diff(own[order]) > 4 * slack))
+        if 2 * len(each) <= len(own) and all(np.ptp(own[rows]) <= 2 * slack for rows in each):
+            values = np.empty(len(own))
+            for rows in each:
+                values[rows] = round(float(np.median(own[rows])), round(-np.log10(measured.step)))
+            path = [f"{measured.heading} − {deviation.heading}"]
+            return replace(measured, i=-1, path=path, values=values, role="reference")
     return None
+
+
+def of_means(measured: FigureColumn, reference: FigureColumn) -> bool:
+    """Whether references are but the means of what was measured of each, from which deviations may be taken."""
+    each = [(value, measured.values[reference.values == value].mean()) for value in np.unique(reference.values)]
+    return all(abs(value - mean) <= 1.05 * reference.step for value, mean in each)
 
 
 def follows(column: FigureColumn, base: FigureColumn) -> bool:

@@ -210,8 +210,7 @@ def _lengths(
             [evidence.steady(m, c) for m in whole for c in columns if c in small or c.minute] if base is None else []
         )
         checked += sum(map(bool, single))
-        mean = np.mean([c.values for c in source]) if source else np.nan  # of which no calibration is known
-        known = (one for one in single if one is not None and abs(one.values[0] - mean) > 1.05 * one.step)
+        known = (one for one in single if one is not None and not evidence.of_means(source[0], one))
         base = base or _reference_in_head(grid, rows, source) or next(known, None)
     named = {c.unit.name for c in source if c.unit} if deviations else set()
     source = source if side_by_side(source) or (deviations and checked) else counted_heads(source)

@@ -59,7 +59,14 @@ def lines_and_runs(
         if not line or not fixes(factors.together(reference, *(f[1] for f in line)), one[1]):
             line.append(one)
     lined = any(f[2] == LINE for f in found)
-    line, run = _told_apart(reference, [f for f in plain if f[2] in (None, POINT)], line, run, place, lined=lined)
+    try:
+        line, run = _told_apart(reference, [f for f in plain if f[2] in (None, POINT)], line, run, place, lined=lined)
+    except NotReadError:
+        each = factors.together(reference, lying, *([run[1]] if run else []))
+        if called or not several or fixes(reference, lying) or each.max() + 1 < count:
+            raise
+        said = Label("", tuple(" ".join(_PLACED.findall(text)) for text in stated))
+        line = [(said, lying, LINE)]  # by where it lies, or its direction, alone
     line = _of_rings(found, line)
     # else one length on each line, which are named and not counted
     line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
