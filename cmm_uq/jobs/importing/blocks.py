@@ -17,7 +17,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.figures import figure, sign_of, unit_of
-from cmm_uq.jobs.importing.factors import LINE, RUN, hint
+from cmm_uq.jobs.importing.factors import LINE, RUN, begun, counts_pages, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, NotReadError, Sheet, WrittenUnit, apart, unit_named
 from cmm_uq.jobs.importing.header import COVERAGE, WORD, named_alike, plain_words, without_unit, words_of
 from cmm_uq.jobs.importing.lengths import places
@@ -94,10 +94,6 @@ class CutSheet:
         """Whether a row says the place of a line."""
         return places.said_in([self.line(i)], self.sign).whole
 
-    def titled(self, i: int) -> bool:
-        """Whether a row is the title of a line, or says where one lies."""
-        return self._names_line(i) or self.place(i)
-
     def line(self, row: int) -> str:
         return " ".join(self.text(row, k) for k in range(len(self.sheet.rows[row]))).strip()
 
@@ -139,7 +135,7 @@ class CutSheet:
         """Texts above a cell."""
         return self.block_of[row].paths[i] if row in self.block_of else []
 
-    def _names_line(self, row: int) -> bool:
+    def names_line(self, row: int) -> bool:
         """Whether a row begins what is said of a line, and is no direction below its start."""
         text = self.line(row)
         directed = places.role_among(self.text(row, 0)) == places.DIRECTION and places.says_figures(text)
@@ -225,14 +221,14 @@ class CutSheet:
                 if block is not None:
                     yield block
                 paths, number = self._paths(head), 1 if block is None else block.number + 1
-                if block is not None and paths == block.paths and any(_counts_pages(self.line(k)) for k in above):
+                if block is not None and paths == block.paths and any(counts_pages(self.line(k)) for k in above):
                     number = block.number  # it goes on
                 block = Block(paths, number=number, head=head)
             block.above += above
             block.rows.append(i)
             block.titles[i] = titles
             if above:
-                lined = [k for k, row in enumerate(above) if self._names_line(row)]
+                lined = [k for k, row in enumerate(above) if self.names_line(row)]
                 told = [self.line(row) for row in above[lined[-1] if lined else max(0, len(above) - DEEPEST) :]]
                 told = told if lined or any(hint(text, lengths=True) != RUN for text in told) else last
                 last = told
@@ -278,11 +274,16 @@ class CutSheet:
                 block.titles[row], before = {**own, **last}, own
         return blocks
 
+    def columns_of_places(self, row: int) -> dict[str, list[int]]:
+        """Columns of starts, ends and directions of lines, in the block of a row."""
+        if (block := self.block_of[row]).number not in self.places:
+            self.places[block.number] = place_columns(self, block)
+        return self.places[block.number]
+
     def says(self, row: int) -> tuple[str, ...]:
         """What may say where the line of a row lies: titles above it, texts beside it, columns of starts and ends."""
         block, texts = self.block_of[row], [*self.above.get(row, ())]
-        if (columns := self.places.get(block.number)) is None:
-            columns = self.places[block.number] = place_columns(self, block)
+        columns = self.columns_of_places(row)
         for i, own in enumerate(self.figures[row]):
             if own is None and (text := self.text(row, i)):
                 role = places.role_among(heading(block.paths[i]) if i < len(block.paths) else "")
@@ -328,9 +329,9 @@ class CutSheet:
         pairs = _PAIRS.split(text)
         parts = pairs if all(":" in pair for pair in pairs) else [text]
         parts = cells if len(cells) > 1 and all(hint(cell, lengths=True) for cell in cells) else parts
-        if any(_counts_pages(part) for part in parts):
+        if any(counts_pages(part) for part in parts):
             return {}
-        titles = {(_begun(first[0]) if (first := WORD.search(part)) else part): part for part in parts}
+        titles = {(begun(first[0]) if (first := WORD.search(part)) else part): part for part in parts}
         return {**titles, "": text} if placed or (len(cells) == 1 and text not in self._always) else titles
 
     def _head(self, pending: Sequence[int], numbers: Sequence[int]) -> list[int]:
@@ -375,12 +376,11 @@ class CutSheet:
     def _titles_above(self, row: int, filled: Sequence[int], head: Sequence[int], numbers: Sequence[int]) -> bool:
         """Whether a row that fills the first cells alone is of titles, above heads that name each column already."""
         paths = self._paths(head)
-        names = [text for k in numbers if (text := heading(paths[k]))]
         packed = filled == [*range(len(filled))] and 1 < len(filled) < sum(any(path) for path in paths)
-        if not packed or len({*names}) < len(numbers):
+        if not packed or len({heading(paths[k]) for k in numbers} - {""}) < len(numbers):
             return False
-        texts = [self.text(row, k) for k in filled]
-        return not all(self._says_role(text) or unit_of([text]) or hint(text, lengths=True) for text in texts)
+        each = (self.text(row, k) for k in filled)
+        return not all(self._says_role(text) or unit_of([text]) or hint(text, lengths=True) for text in each)
 
     def _paths(self, head: Sequence[int]) -> list[list[str]]:
         """Texts above each column; a text of an upper row stands over the columns up to the next one of it or above it."""
@@ -398,13 +398,3 @@ class CutSheet:
                     texts[k] = texts[k] or (texts[k - 1] if below[k] and not begun[k] else "")
             levels.append(texts)
         return [[level[k] for level in levels] for k in range(self.width)]
-
-
-def _counts_pages(text: str) -> bool:
-    words = plain_words(text)
-    return any(a in words_of("rows")["page"] and b.isdigit() for a, b in pairwise(words))
-
-
-def _begun(word: str) -> str:
-    """How a title begins; all letters of axes alike."""
-    return "x" if len(word) == 1 and word.isascii() else re.sub(r"^[xyz](?=[^\x00-\x7f])", "x", word.casefold())

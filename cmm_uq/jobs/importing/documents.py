@@ -59,8 +59,7 @@ class Qif(Format):
                 others += local(element).endswith(_MEASUREMENT)
             beside += [own] * (len(rows) - len(beside))
         if not rows and (found := lengths_of_qif(root)):
-            heads = ["run", "name", "nominal", "measured"]
-            return sheets_of(found, heads, unit=length_unit(root, where), decimal=".")
+            return sheets_of(found, ["run", "name", "nominal", "measured"], unit=length_unit(root, where), decimal=".")
         if not rows:
             problem = f"holds no measured sphere, point or circle, and {others} other features"
             fix = "Export the results with the measured features and their locations"
@@ -321,8 +320,7 @@ def _nested(element: Element, where: str, depth: int) -> Any:
         inside.setdefault(local(one), []).append(_nested(one, where, depth + 1))
     if not inside and not element.attrib:
         return text
-    named = ((name.rpartition("}")[2], value) for name, value in element.attrib.items())
-    # a number of something says by its element what it counts
+    named = ((name.rpartition("}")[2], value) for name, value in element.attrib.items())  # a number by what it counts
     own: dict[str, Any] = {f"{local(element)} {name}" if value.isdigit() else name: value for name, value in named}
     own |= {local(element): text} if text else {}
     for name, values in inside.items():

@@ -343,3 +343,13 @@ def numbered_runs(values: Sequence[str]) -> Ints:
     if plain and len({*values}) == len({one[0] for one in numbers}):
         return np.array([int(one[0]) for one in numbers])
     return codes(values) + 1
+
+
+def counts_pages(text: str) -> bool:
+    words = plain_words(text)
+    return any(a in words_of("rows")["page"] and b.isdigit() for a, b in pairwise(words))
+
+
+def begun(word: str) -> str:
+    """How a title begins; all letters of axes alike."""
+    return "x" if len(word) == 1 and word.isascii() else re.sub(r"^[xyz](?=[^\x00-\x7f])", "x", word.casefold())

@@ -20,6 +20,7 @@ from cmm_uq.jobs.importing.cells.figures import SMALL, unit_of
 from cmm_uq.jobs.importing.factors import LINE, Label, hint
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, WrittenUnit, converted, sort_of, unit_named
 from cmm_uq.jobs.importing.header import WORD, Header, plain_words, understood, unspaced, without_unit, words_of
+from cmm_uq.jobs.importing.lengths.places import DIRECTION
 
 Role = Literal["summary", "deviation", "reference", "measured", "target", "nominal"]
 _IN_TURN: tuple[Role, ...] = ("summary", "deviation", "reference", "measured", "target", "nominal")
@@ -212,6 +213,8 @@ class SheetReading:
                 and not (sort and c.unit and sort[0] != c.unit.sort)
             ):
                 self.further[name] = converted(c.values, c.unit, name) if c.unit and sort else c.values
+        of_way = [] if self.kind != "lengths" else grid.columns_of_places(rows[0]).get(DIRECTION, [])  # and no names
+        used |= {*of_way} if len(of_way) == len(COORDINATES) else set()
         self.beside = _beside(grid, rows, used | {c.i for c in columns if c.role == "deviation" and c.minute})
         self.read |= {c.i for c in columns if called[c.i] in self.further and c.i not in used}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.format import ImportKeys
+from cmm_uq.jobs.importing.format import ImportKeys, NotReadError
 from cmm_uq.jobs.importing.lines import MeasuredLengths, UnplacedRunsError
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, imported
 
@@ -175,3 +175,78 @@ def test_a_laser_run_by_numbers_of_targets() -> None:
     found = imported(text.encode(), "x.rtl", ImportKeys(lines={"Y": "along Y from 315,0,400"}))
     np.testing.assert_allclose(found.columns["reading_um"][3:6], [8.0, 2.5, 1.0])
     assert {*found.columns["approach_y"].tolist()} == {1.0, -1.0}
+
+
+def lines_of(head: str, row: str, count: int = 3) -> str:
+    """A table of three lengths on lines; ``row``: of line p, length n and two readings a, b."""
+    rng = np.random.default_rng(7)
+    rows = [row.format(p=p, n=n, a=n + rng.normal(0, 0.001), b=n + rng.normal(0, 0.001), d=rng.normal(0, 0.001))
+            for p in range(1, count + 1) for n in (100.0021, 250.0043, 400.0036)]  # fmt: skip
+    return "\n".join([head, *rows, ""])
+
+
+def test_runs_there_and_back_are_runs() -> None:
+    found = lengths(lines_of("Linie;Kalibriert (mm);Hin 1;Rück 1", "{p};{n:.4f};{a:.4f};{b:.4f}"))
+    assert ({*found.repeat}, {*found.names}) == ({1, 2}, {"1", "2", "3"})
+
+
+def test_what_was_found_and_what_was_left_are_two_recordings() -> None:
+    with pytest.raises(NotReadError, match="before and after it was adjusted"):
+        imported(
+            lines_of("Line;Cal. length mm;As found;As left", "{p};{n:.4f};{a:.4f};{b:.4f}").encode(),
+            "x.csv",
+            ImportKeys(),
+        )
+
+
+def test_the_finer_column_that_never_changes_is_calibrated() -> None:
+    found = lengths(lines_of("Line;Nominal mm;Actual;Run1;Run2", "{p};{n:.0f};{n:.4f};{a:.4f};{b:.4f}"))
+    assert found.reference[:3] == [100.0021, 100.0021, 250.0043]
+    assert {*found.repeat} == {1, 2}
+
+
+def test_what_was_measured_less_its_deviation_is_the_reference() -> None:
+    rows = [f"L{p};{n + e:.4f};{e:.4f}" for p, own in enumerate(((0.0012, -0.0004, 0.0021), (0.0003, 0.0015, -0.0008)), 1)
+            for n, e in zip((100.0021, 250.0043, 400.0036), own, strict=True)]  # fmt: skip
+    found = lengths("\n".join(["Line;Measured mm;Deviation mm", *rows, ""]))
+    assert found.reference == [100.0021, 250.0043, 400.0036] * 2
+    without = "\n".join(row.rsplit(";", 1)[0] for row in ["Line;Measured mm;Deviation mm", *rows])
+    with pytest.raises(NotReadError, match="of several sizes"):
+        imported(f"{without}\n".encode(), "x.csv", ImportKeys())
+
+
+def test_lines_may_be_told_by_their_direction_alone() -> None:
+    ways = {1: "1;0;0", 2: "0;1;0", 3: "0.577;0.577;0.577"}
+    text = lines_of("#;i;j;k;L_cal [mm];E1 [µm];E2 [µm]", "{p};WAY{p};{n:.4f};{d:.5f}00;{a:.2f}")
+    rows = [text.splitlines()[0]]
+    for k, (p, n) in enumerate([(p, n) for p in ways for n in (100.0021, 250.0043, 400.0036)], 1):
+        rows.append(f"{k};{ways[p]};{n};{0.3 * k % 1.1:.2f};{0.7 * k % 1.3:.2f}")
+    found = lengths("\n".join([*rows, ""]))
+    assert [len({*found.names}), {*found.repeat}] == [3, {1, 2}]
+    assert all(name.startswith("direction (") for name in found.names)
+    twice = [
+        f"{k};1;0;0;{n};{0.3 * k % 1.1:.2f};{0.7 * k % 1.3:.2f}" for k, n in enumerate((100.0021, 250.0043) * 3, 1)
+    ]
+    with pytest.raises(NotReadError, match="which lengths lie on one line"):  # parallel lines, for all that is known
+        imported("\n".join([rows[0], *twice, *rows[4:7], ""]).encode(), "x.csv", ImportKeys())
+
+
+def test_positions_beside_targets_need_no_word() -> None:
+    rng = np.random.default_rng(3)
+    rows = [f"X\t{run}\t{way}\t{t:.3f}\t{t + rng.normal(2, 0.5) / 1000:.5f}" for run in (1, 2) for way in "FR"
+            for t in sorted((0.0, 100.0, 200.0, 300.0), reverse=way == "R")]  # fmt: skip
+    found = runs("\n".join(["Axis\tRun\tDir\tPos (mm)\tLaser (mm)", *rows, ""]), "X", "x.txt")
+    assert {*found.columns["x_mm"].tolist()} == {0.0, 100.0, 200.0, 300.0}
+    assert np.abs(found.columns["reading_um"] - 2).max() < 2.5
+
+
+def test_numbers_in_attributes_of_xml_count_what_their_elements_are() -> None:
+    body = "".join(
+        f"<Position nr='{p}'>" + "".join(f"<Length nominal='{n}'>" + "".join(
+            f"<Trial n='{r}'>{n + (p - 2 * r) / 10000:.4f}</Trial>" for r in (1, 2)) + "</Length>"
+            for n in (100.0, 250.0, 400.0))
+        + "</Position>" for p in (1, 2, 3))  # fmt: skip
+    with pytest.raises(UnplacedError) as error:
+        imported(f"<?xml version='1.0'?>\n<Report>{body}</Report>".encode(), "x.xml", ImportKeys(unit="mm"))
+    found = error.value.lengths[0]
+    assert ({*found.names}, {*found.repeat}) == ({"1", "2", "3"}, {1, 2})

@@ -100,7 +100,10 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     called = [c for c in large if c.role in ("target", "nominal")]
     if any(not c.counts for c in called) or (called and not any(c.step < 1 for c in large)):
         return min(called, key=lambda c: (c.counts, not c.round))  # and not their numbers, nor what was reached
-    large = [c for c in large if c.role in (None, "measured", "reference") and not c.counts]
+    reached = [
+        c for c in large if c.role == "reference" and not c.counts
+    ]  # as by the laser; a calibrated one is no target
+    large = [c for c in large if c.role in (None, "measured") and not c.counts]
     spans = [float(np.ptp(c.values[np.isfinite(c.values)])) for c in columns if not c.counts]
     bare = [c for c in large if c.role is None and np.ptp(c.values[np.isfinite(c.values)]) == max(spans)]
     if bare and sum(span * _WIDER > max(spans) for span in spans) == 1:
@@ -112,7 +115,10 @@ def _target(columns: Sequence[FigureColumn]) -> FigureColumn | None:
     small = [c for c in columns if c not in near and c.role != "summary"]
     if near and (base := settled_base(near, differences(near, small))) is not None:
         return base
-    if len(near) == len({"target", "reached"}) and (again := [c for c in near if any(scatters(o, c) for o in near)]):
+    again = [
+        c for c in large if any(like(c.values + 1000, o.values + 1000) and scatters(o, c) for o in (*near, *reached))
+    ]
+    if len(again) == 1 and len({c.i for c in (*near, *reached, *again)}) == len({"target", "reached"}):
         return again[0]  # beside what was reached, which is another each time
     counting = [
         c for c in large if c.role == "measured" and hint(c.heading, lengths=True) == RUN
