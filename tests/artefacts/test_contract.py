@@ -6,15 +6,18 @@ One test carries them all, a kind from another package too: planned, simulated, 
 from __future__ import annotations
 
 import json
+import pickle
 import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cmm_uq.analysis.planning.setting import Planning
+from cmm_uq.analysis.screening.screening import ScreenedRecording, screen_recording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.app.commands.diagnose import write_diagnosis
 from cmm_uq.app.commands.jobs.simulate import write_simulation
@@ -23,6 +26,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import REPORT, write_report
 from cmm_uq.artefacts import BUILT_IN, kind_named, names
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Points
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.result import OwnAnalysis, Page
 from cmm_uq.jobs.dcc import read as read_dcc
@@ -189,6 +193,35 @@ SPOILT = [
 ]  # fmt: skip
 
 
+@pytest.fixture
+def screened_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What each command screens is looked at once, as long as it is the very same."""
+    looked: dict[bytes, CmmUqError | ScreenedRecording] = {}
+
+    def screen(points: Points, facts: ArtefactFacts, *given: Any, needed: set[str], **how: Any) -> ScreenedRecording:
+        columns = {
+            "xyz": points.xyz,
+            "set-up": points.measurement,
+            "point": points.point,
+            "repeat": points.repeat,
+            **points.columns,
+        }
+        held = {column: values.tobytes() for column, values in columns.items()}
+        key = pickle.dumps((held, facts.model_dump_json(), sorted(needed), how))
+        if key not in looked:
+            try:
+                looked[key] = screen_recording(points, facts, *given, needed=needed, **how)
+            except CmmUqError as error:
+                looked[key] = error
+        found = looked[key]
+        if isinstance(found, CmmUqError):
+            raise found
+        return found
+
+    monkeypatch.setattr("cmm_uq.app.commands.model.screen_recording", screen)
+
+
+@pytest.mark.usefixtures("screened_once")
 @pytest.mark.parametrize(("name", "how"), SPOILT)
 def test_what_report_refuses_of_a_recording_every_command_refuses_alike(name: str, how: str, tmp_path: Path) -> None:
     job, truth = spoilt(name, how, tmp_path / "job"), tmp_path / "truth.toml"

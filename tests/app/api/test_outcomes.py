@@ -14,14 +14,14 @@ import pytest
 
 import cmm_uq
 from cmm_uq.app.api.outcomes import Part, Report
-from cmm_uq.app.commands.report import write_report
 from cmm_uq.jobs.part.job import TABLES
 from tests.app.cli.test_due import recorded
+from tests.certificate.iota import JOB as IOTA, iota_report
 from tests.conftest import ROOT
 from tests.laboratory.records.histories import certificate
 from tests.part_machines import THERE, by_results, plate_of
-
-IOTA = ROOT / "examples" / "iota-1102-20C"
+from tests.part_reports import nothing_foreseen
+from tests.shared import put
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +32,7 @@ def found() -> Report:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What the command writes."""
-    folder = tmp_path_factory.mktemp("written")
-    write_report(IOTA, folder / "out")
-    return folder / "out"
+    return put(tmp_path_factory.mktemp("written"), iota_report())
 
 
 @pytest.fixture(scope="module")
@@ -150,7 +148,9 @@ def test_a_plan_lists_its_placings_and_writes_the_recording_to_fill_in(tmp_path:
 @pytest.fixture(scope="module")
 def part() -> Part:
     job = plate_of(by_results(), np.zeros((60, 3)), characteristic=TABLES["characteristic"][:2], **THERE)
-    return cmm_uq.part(job, trials=1000, seed=2, language="de")
+    with pytest.MonkeyPatch.context() as patched:
+        nothing_foreseen(patched)
+        return cmm_uq.part(job, trials=1000, seed=2, language="de")
 
 
 @pytest.mark.long

@@ -13,6 +13,7 @@ from cmm_uq.jobs.part.job import TABLES
 from tests.artefacts.simulated import reported
 from tests.conftest import ROOT
 from tests.part_machines import THERE, by_results, plate_of
+from tests.part_reports import nothing_foreseen
 
 IOTA = ROOT / "examples" / "iota-1102-20C"
 
@@ -30,7 +31,9 @@ def gauge() -> Report:
 @pytest.fixture(scope="module")
 def part() -> Part:
     job = plate_of(by_results(), np.zeros((60, 3)), characteristic=TABLES["characteristic"][:2], **THERE)
-    return cmm_uq.part(job, trials=2_000)
+    with pytest.MonkeyPatch.context() as patched:
+        nothing_foreseen(patched)
+        return cmm_uq.part(job, trials=2_000)
 
 
 def texts(figure: Figure) -> set[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,28 @@ from tests.jobs.importing.laboratory import EXPORTS
 from tests.jobs.importing.test_interferometer import written
 
 
-def laid_out(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
+@pytest.fixture(scope="module")
+def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("exports")
+
+
+@cache
+def laid_out(folder: Path, name: str) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    """An export, the keys that it needs, and how it is read with them."""
     file, made = EXPORTS[name]
     export = made()
-    path = folder / file
+    path = folder / name / file
+    path.parent.mkdir()
     path.write_bytes(export.content)
-    return path, dict(export.keys)
+    return path, dict(export.keys), read(str(path), dict(export.keys))
+
+
+@cache
+def laid_out_and_placed(folder: Path, name: str) -> tuple[Path, dict[str, Any], dict[str, Any]]:
+    """The same with places of its lines."""
+    path, keys, found = laid_out(folder, name)
+    keys = placed(found, keys)
+    return path, keys, read(str(path), keys)
 
 
 def placed(found: dict[str, Any], keys: dict[str, Any]) -> dict[str, Any]:
@@ -44,10 +61,8 @@ def as_said(command: str) -> ImportKeys:
 
 
 @pytest.mark.parametrize("name", EXPORTS)
-def test_the_command_on_the_page_reads_the_same(name: str, tmp_path: Path) -> None:
-    path, keys = laid_out(tmp_path, name)
-    keys = placed(read(str(path), keys), keys)
-    found = read(str(path), keys)
+def test_the_command_on_the_page_reads_the_same(name: str, exports: Path) -> None:
+    path, keys, found = laid_out_and_placed(exports, name)
     assert found["problem"] is None, found["problem"]
     assert found["example"]
     content = path.read_bytes()
@@ -57,9 +72,8 @@ def test_the_command_on_the_page_reads_the_same(name: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", EXPORTS)
-def test_every_column_that_is_used_is_coloured_where_it_stands(name: str, tmp_path: Path) -> None:
-    path, keys = laid_out(tmp_path, name)
-    found = read(str(path), placed(read(str(path), keys), keys))
+def test_every_column_that_is_used_is_coloured_where_it_stands(name: str, exports: Path) -> None:
+    _, _, found = laid_out_and_placed(exports, name)
     meanings = {meaning for _, meaning in found["columns"]}
     assert {"x_mm", "y_mm", "z_mm"} <= meanings or meanings & {"length_mm", "deviation_um", "deviation_mm"}
     figures = [cells for _, cells, head in found["rows"] if not head]
@@ -89,9 +103,8 @@ def test_list_boxes_that_nobody_touched_are_no_answer(path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", EXPORTS)
-def test_a_form_that_changes_nothing_says_nothing(name: str, tmp_path: Path) -> None:
-    path, keys = laid_out(tmp_path, name)
-    found = read(str(path), keys)
+def test_a_form_that_changes_nothing_says_nothing(name: str, exports: Path) -> None:
+    path, keys, found = laid_out(exports, name)
     chosen = {str(i): meaning for i, (_, meaning) in enumerate(found["columns"])}
     lines = {"lines": keys.get("lines", {})}
     others = {one: str(value) for one, value in keys.items() if one not in ("columns", "lines")}

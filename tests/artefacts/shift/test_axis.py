@@ -17,6 +17,7 @@ from cmm_uq.artefacts.shift.series import shifted_series
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.shift.shifted import PITCH_20, bent, integrated_by_monte_carlo, read
+from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
 
 NOISE = 1.1e-3
@@ -195,7 +196,7 @@ def truth(x: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def example() -> ShiftResult:
-    result = analyse(EXAMPLE)
+    result = analysed("shift-simulated")
     assert isinstance(result, ShiftResult)
     return result
 

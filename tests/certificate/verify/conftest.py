@@ -1,34 +1,23 @@
-"""A certificate of a real recording with all its forms, made once for all processes of a run of the tests."""
+"""A certificate of a real recording with all its forms."""
 
 from __future__ import annotations
 
-import os
 import shutil
 from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.commands.report import write_report
 from cmm_uq.certificate.verify.again import Again
-from tests.conftest import ROOT
+from tests.certificate.iota import iota_report
+from tests.shared import put
 
-JOB = ROOT / "examples" / "iota-1102-20C"
 DOCUMENTS = ("certificate.pdf", "certificate.html", "results.json")
 
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of the report; not to be changed."""
-    share = os.environ.get("CMM_UQ_TESTS_SHARE")
-    folder = (Path(share) if share else tmp_path_factory.getbasetemp()) / "verified-certificate"
-    if not folder.exists():
-        own = folder.with_name(f"{folder.name}-{os.getpid()}")
-        write_report(JOB, own)
-        try:
-            own.rename(folder)
-        except OSError:  # another process was first
-            shutil.rmtree(own)
-    return folder
+    return put(tmp_path_factory.mktemp("verified") / "certificate", iota_report())
 
 
 @pytest.fixture
