@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from benchmarks.third.forms import DICTIONARY
 from benchmarks.third.known import further
 from benchmarks.third.oracle import catalogue, searched_for
 from cmm_uq.machine.physics.catalogue import EVERY
-from tests.conftest import ROOT
+from tests.imports import packages_reached
 from tests.second.test_cases import as_read
 
 SOME = (0, 2, 5, 8, 13, 16, 19, 22, 30, 33, 45, 58)
@@ -30,15 +29,7 @@ SOME = (0, 2, 5, 8, 13, 16, 19, 22, 30, 33, 45, 58)
 
 
 def test_no_code_of_the_package_makes_a_case_or_searches_it() -> None:
-    program = (
-        "import sys\n"
-        "from benchmarks.fourth import cases\n"
-        "from benchmarks.third import judging, oracle\n"
-        "assert 'p' in oracle.searched_for(cases.case(999, 0), 1, whole=True)\n"
-        "print({name.split('.')[0] for name in sys.modules} & {'cmm_uq', 'pandas'})\n"
-    )
-    run = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert run.stdout == "set()\n"
+    assert not {"cmm_uq", "pandas"} & packages_reached("benchmarks.fourth.cases", "benchmarks.third.oracle")
 
 
 def placed_as(what: str) -> Placed:
