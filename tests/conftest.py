@@ -179,17 +179,20 @@ def no_regions(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def formless() -> Iterator[None]:
-    """Without functions of unknown form, half of a diagnosis of what agrees with its model: where these are not the matter."""
+def without_diagnosis() -> Iterator[None]:
+    """As if nothing were missing in the model: the search for it is more than half of a report."""
+    alike = np.zeros(1)
     with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("cmm_uq.analysis.diagnosis.comparison.search.lack_of_fit", lambda *_: (1.0, alike, alike))
         patched.setattr("cmm_uq.analysis.diagnosis.comparison.search.lack_of_form", lambda *_: 1.0)
+        patched.setattr("cmm_uq.app.commands.diagnose.smallest_effects", lambda *_: ())
         yield
 
 
 @pytest.fixture
-def no_forms() -> Iterator[None]:
+def no_diagnosis() -> Iterator[None]:
     """For tests that analyse a job of their own, and are not about what its model leaves out."""
-    with formless():
+    with without_diagnosis():
         yield
 
 

@@ -93,7 +93,7 @@ def estimated(report: cmm_uq.Report) -> None:
         assert np.all(np.abs(found["value"].to_numpy() - want) < 3.5 * found["u"].to_numpy()), name
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.parametrize("turns", ["", "clockwise"])
 def test_figures_and_errors_against_certified_faces(tmp_path: Path, turns: str) -> None:
     """A polygon as its certificate says, or nearly: figures are those of the table's deviations as it reads."""
@@ -110,7 +110,7 @@ def test_figures_and_errors_against_certified_faces(tmp_path: Path, turns: str) 
     assert run["U"]["B"] == pytest.approx(0.0, abs=1e-9)  # a face is the same from either side
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 def test_faces_are_found_by_closure_with_the_table(tmp_path: Path) -> None:
     """Four settings of a polygon that nobody calibrated: its faces and the table's errors are both found."""
     folder, faces, first = job(tmp_path / "job", [0, 1, 4, 9], "", repeats=2)
@@ -137,7 +137,7 @@ def test_settings_that_leave_faces_and_table_open_are_refused(tmp_path: Path, se
         artefact_of(read.facts.artefact, read.points)
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 def test_two_settings_one_face_apart_are_enough(tmp_path: Path) -> None:
     folder, _, first = job(tmp_path / "job", [0, 1], "")
     run = cmm_uq.report(folder, seed=1).results["runs"][0]

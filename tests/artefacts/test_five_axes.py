@@ -20,7 +20,7 @@ from cmm_uq.app.commands.planning import make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
-from tests.conftest import formless
+from tests.conftest import without_diagnosis
 from tests.jobs.test_reading import edit
 
 CHAINS = ["XYZ|AC", "XYZ-CA"]
@@ -33,7 +33,7 @@ def reported(chain: str) -> tuple[dict[str, Any], Points, Report]:
     machine = drawn(random, names)
     with TemporaryDirectory() as folder:
         job = recorded(chain, machine, names, random, Path(folder) / "job")
-        with formless():
+        with without_diagnosis():
             return machine, read_job(job).points, cmm_uq.report(job, seed=1)
 
 

@@ -235,7 +235,7 @@ def test_diameter_and_roundness_of_the_example_are_those_of_a_circle_fitted_by_s
     assert float(size.replace("−", "-")) == pytest.approx((2 * fit.x[2] - 50.0013) * 1e3, abs=0.011)
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.parametrize(("form", "outcome"), [("form_um = 0.2", "pass"), ("", "undecided")])
 def test_squareness_passes_by_no_ring_of_unknown_form(form: str, outcome: str, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / JOB, tmp_path / "job")

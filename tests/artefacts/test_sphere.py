@@ -114,7 +114,7 @@ def test_what_a_ball_that_is_not_round_does_to_lobes_is_in_their_uncertainty(lob
         assert np.all(np.abs(off[:3]) <= 2 * u[:3] + 1e-9)
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.parametrize(
     ("form", "outcome"), [("form_um = 0.1", "pass"), ("form_um = 1.0", "undecided"), ("", "undecided")]
 )

@@ -49,7 +49,7 @@ BESIDE = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 720.0])  # seven positions
 TURNS = np.array([0.0, 180.0, 181.0, 360.0, 361.0, 540.0, 541.0, 720.0])
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.parametrize("machine", [False, True])
 def test_four_axis_errors_are_ranges_of_polar_coordinates_on_the_table(job: Path, *, machine: bool) -> None:
     found = recorded(job, THERE_AND_BACK, machine=machine)
@@ -72,7 +72,7 @@ def outcome(job: Path, figure: str = "FR") -> tuple[str, str]:
     return found.outcome, " ".join(map(str, found.missing))
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 def test_the_larger_of_both_spheres_is_decided_against_each_limit(job: Path) -> None:
     recorded(job, THERE_AND_BACK)
     spheres = cmm_uq.report(job, seed=1).results["spheres"]

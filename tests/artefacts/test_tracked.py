@@ -29,7 +29,7 @@ from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.stated import physics_of
 from tests.artefacts.simulated import outcome
-from tests.conftest import ROOT, formless
+from tests.conftest import ROOT, without_diagnosis
 
 EXAMPLES = ROOT / "examples"
 FILES = new_job("tracked_points", {}, id="robot")
@@ -68,7 +68,7 @@ def recording(change: dict[str, float | None]) -> bytes:
 
 @pytest.fixture(scope="module")
 def found() -> Result:
-    with formless():
+    with without_diagnosis():
         result = evaluate_job(simulated_job(robot(), TRUTH))
     assert isinstance(result, Result)
     return result
@@ -158,7 +158,7 @@ def test_play_that_the_model_leaves_out_is_named() -> None:
 
 @cache
 def reported() -> Outcome:
-    with formless():
+    with without_diagnosis():
         return report_outcome(robot())
 
 
@@ -189,7 +189,7 @@ def test_no_part_is_evaluated_by_the_certificate_of_an_arm(tmp_path: Path) -> No
         write_part(tmp_path / "part", tmp_path / "out")
 
 
-@pytest.mark.usefixtures("no_forms")
+@pytest.mark.usefixtures("no_diagnosis")
 def test_a_robot_by_screw_axes_is_the_one_by_its_rows_and_its_axes_are_found() -> None:
     """The same robot stated either way leaves the same distances, and its screw axes are found."""
     by_rows, other = robot(), reported().found

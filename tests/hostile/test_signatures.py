@@ -33,4 +33,7 @@ def test_an_attack_is_not_taken_for_good(form: str, name: str, of: World) -> Non
 @pytest.mark.parametrize("twice", [False, True])
 def test_a_good_signature_is_good(level: str, twice: bool, of: World) -> None:
     assert verdict("pdf", of.signed("pdf", level, twice), of.trust) == GOOD
+
+
+def test_a_good_signature_of_a_digital_certificate_is_good(of: World) -> None:
     assert verdict("xml", of.signed("xml"), of.trust) == GOOD

@@ -304,7 +304,7 @@ def test_a_calibration_that_did_not_hold_makes_no_pass_and_hides_nothing_worse(l
     assert (found.outcome, lack in found.missing) == (outcome, True)
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.parametrize(("example", "u", "tolerances", "undecided"), [
     # 79 ± 40 ppm, 80 ± 33 with an exact length; a squareness comes from comparing bars with each other
     ("iota-1102-20C", "u_um", {"scale_x": 115.0, "squareness_xy": 300.0}, {"scale_x.ppm"}),
@@ -332,7 +332,7 @@ def test_a_tolerance_on_what_rests_on_a_size_without_uncertainty_is_no_pass(
         assert len(found) == len(tolerances)
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.parametrize(("changed", "lack"), [
     ("[[thermometer]]\ncolumns = ['temp_x_c']\ncertificate = { due = 2004-08-31 }", "the calibration was due on 2004-08-31"),
     ("[[thermometer]]\ncolumns = ['temp_x_c']\ncertificate = { due = 2004-09-01 }", None),

@@ -12,7 +12,7 @@ from typing import Any
 
 from cmm_uq.laboratory.records import open_records
 from tests.app.cli.process import run
-from tests.conftest import ROOT, formless
+from tests.conftest import ROOT
 from tests.shared import files_below, put, shared_files
 
 PLACE = Path("reports") / "records.db"
@@ -63,8 +63,7 @@ def _reported() -> Mapping[str, bytes]:
             "[recording]\n", f"{CHAIN}[recording]\n"
         )
         (job / "job.toml").write_text(toml, encoding="utf-8")
-        with formless():
-            done = run("report", job, "--out", folder / "reports" / "mount", "--records", folder / PLACE, "--quiet")
+        done = run("report", job, "--out", folder / "reports" / "mount", "--records", folder / PLACE, "--quiet")
         assert done.returncode == 0, done.stderr
         return files_below(folder)
 

@@ -27,7 +27,7 @@ def budget(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 def test_a_strict_run_ends_with_4_where_the_machine_does_not_conform(iota: Path, tmp_path: Path) -> None:
     done = run("report", iota, "--out", tmp_path / "out", "--strict", "--quiet")
     assert done.returncode == 4
@@ -175,7 +175,7 @@ def test_no_command_takes_the_folder_of_another(tmp_path: Path, first: str) -> N
     assert _files(tmp_path) == before
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.parametrize("command", ["budget", "plan", "diagnose", "report", "simulate", "compensate"])
 def test_no_command_writes_over_its_own_inputs(tmp_path: Path, command: str) -> None:
     """A recording that has the name of an output, or the job's own folder as the output."""

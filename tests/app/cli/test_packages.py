@@ -20,7 +20,7 @@ from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import BrokenPluginError, naming_package, told_with_package
 from tests.app.cli.process import COMMAND, run as run_here
 from tests.app.commands.test_planning import JOB, SIX
-from tests.conftest import ROOT, formless
+from tests.conftest import ROOT, without_diagnosis
 from tests.plugin.packages import OUTSIDE_EFFECTS, OUTSIDE_KINDS, OUTSIDE_STANDARDS, describe, install
 
 EXAMPLE = ROOT / "examples" / "gauge-blocks-simulated"
@@ -159,7 +159,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
         done(run_here("plan", job, "--out", work / "plan", "--no-power", "--quiet"))
         shutil.copy(work / "plan" / "plan.csv", job / "recording.csv")
         done(run_here("simulate", job, "--truth", work / "truth.toml", "--out", work / "simulated"))
-        with formless():
+        with without_diagnosis():
             done(run_here("report", work / "simulated", "--out", work / "report", "--quiet"))
     shutil.copytree(work / "simulated", work / "left-out")
     drawn = (work / "simulated" / "job.toml").read_text(encoding="utf-8")

@@ -23,7 +23,7 @@ from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
 from tests.artefacts.simulated import analysed
-from tests.conftest import ROOT, formless
+from tests.conftest import ROOT, without_diagnosis
 
 EXAMPLES = ROOT / "examples"
 
@@ -140,7 +140,7 @@ def state(job: Path, pattern: str, replacement: str) -> None:
     )
 
 
-@pytest.mark.usefixtures("no_forms")
+@pytest.mark.usefixtures("no_diagnosis")
 def test_a_gross_outlier_is_set_aside_from_the_fit_but_counts_in_the_figures(job: Path, uncompensated: Result) -> None:
     rewrite(job, "x_mm", 9, 2.0)
     found = analyse(job)
@@ -187,7 +187,7 @@ def test_a_stated_noise_that_the_residuals_contradict_is_not_believed(job: Path)
     assert found.parameters["squareness_xy"]["angle_arcsec"].u > 5.0
 
 
-@pytest.mark.usefixtures("no_forms")
+@pytest.mark.usefixtures("no_diagnosis")
 def test_a_stated_noise_is_what_is_known_beforehand(job: Path) -> None:
     state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nu_coordinate_um = 9.0')
     found = analyse(job)
@@ -252,7 +252,7 @@ def stated(job: str, at: Path, text: str = TEMPERATURE) -> Result:
     for line in ("temperature", "fixturing"):  # what a simulation declares negligible is stated here
         declared = re.sub(rf"^{line} = .*\n", "", declared, flags=re.MULTILINE)
     path.write_text(f"{declared}\n[test_uncertainty]\n{text}\n", encoding="utf-8")
-    with formless():
+    with without_diagnosis():
         found = analyse(folder)
     assert isinstance(found, Result)
     return found
@@ -353,7 +353,7 @@ def test_the_plan_is_a_recording_to_fill_in() -> None:
     assert "fit_rms_um" not in job.points.columns
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 def test_what_is_left_to_the_prior_has_no_value_and_no_decision(tmp_path: Path) -> None:
     """One level plate sees the vertical only by how it happens to tilt: what physics allows is no measurement."""
     level = Path(shutil.copytree(EXAMPLES / "plate-simulated", tmp_path / "level"))

@@ -15,7 +15,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import analyse
 from cmm_uq.base.errors import CmmUqError
 from tests.app.cli.process import run
-from tests.conftest import ROOT, formless
+from tests.conftest import ROOT, without_diagnosis
 
 
 def named(job: Path, map_text: str) -> Path:
@@ -118,7 +118,7 @@ def new_map(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Made of every second of the twenty bars of the example, so that the others are another recording."""
     folder = tmp_path_factory.mktemp("map")
     made_of = some_bars(ROOT / "examples" / "iota-1102-20C", folder / "job", range(1, 21, 2))
-    with formless():
+    with without_diagnosis():
         write_new_map(made_of, folder / "map")
     return folder / "map"
 

@@ -22,7 +22,7 @@ from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.derived_job import derived_toml
 from tests.app.commands.test_compensate import named, straight
-from tests.conftest import MACHINE_JOBS, ROOT, formless
+from tests.conftest import MACHINE_JOBS, ROOT, without_diagnosis
 
 TRUTH = "seed = 3\n[effects.squareness_xy]\nangle_arcsec = -40.0\n[noise]\ncoordinate_um = 1.0\n"
 BANNER = "SIMULATED RECORDING, not a calibration certificate"
@@ -65,7 +65,7 @@ def report(simulated: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     laboratory = '[laboratory]\nname = "Lab"\naccreditation = "K-1"\nsignatory = "A. Name"\n\n'
     job.write_text(text.replace("[machine]", f"{laboratory}[machine]", 1))
     out = tmp_path_factory.mktemp("report")
-    with formless():
+    with without_diagnosis():
         write_report(simulated, out)
     job.write_text(text)
     return out

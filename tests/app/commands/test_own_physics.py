@@ -120,7 +120,7 @@ def test_what_the_page_shows_is_taken() -> None:
         assert list(every()) == [*EVERY, "table_tilt", "warming_ram"]
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 def test_a_document_that_is_composed_later_knows_what_the_job_states() -> None:
     """The page is made when it is first asked for, after the command's end."""
     found = cmm_uq.report(drawn(job("guide_wave"), 40.0))

@@ -227,7 +227,7 @@ def test_by_another_clock_and_in_another_zone_what_stands_is_told_weekly_and_nev
     assert at("2026-10-28 06:15:00") == (0, [], 9)
 
 
-@pytest.mark.usefixtures("no_regions", "no_forms")
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 def test_what_was_reported_and_sent_is_in_the_records_and_a_dry_run_only_reads_them(jobs: Path) -> None:
     taken, where = Taken(), jobs / "lab.db"
     with web_server(taken) as port:

@@ -106,7 +106,7 @@ def test_joints_bring_the_tool_to_what_is_simulated_and_the_true_arm_to_the_arte
             assert np.ptp(np.linalg.norm(own - centre, axis=1)) < 1e-3
 
 
-@pytest.mark.usefixtures("no_forms")
+@pytest.mark.usefixtures("no_diagnosis")
 def test_errors_put_into_an_arm_are_found_again_by_its_seats() -> None:
     truth = {"seed": 2, "noise": {"coordinate_um": 10.0}, "effects": {name: {"arcsec": v} for name, v in TRUTH.items()}}
     result = evaluate_job(simulated_job(seats(), truth))

@@ -118,13 +118,13 @@ def test_one_of_another_machine_or_altered_is_refused_before_anything_is_compute
     assert any(words in str(one) and one.fix for one in check_read(job).problems)
 
 
-@pytest.mark.usefixtures("no_forms")
+@pytest.mark.usefixtures("no_diagnosis")
 def test_a_report_refuses_what_a_check_does() -> None:
     with pytest.raises(CmmUqError, match=r"half\.pdf"):
         report_outcome(job_of(beside(PLATE, half=OTHER.read_bytes()[:5000])))
 
 
-@pytest.mark.usefixtures("no_forms")
+@pytest.mark.usefixtures("no_diagnosis")
 def test_a_simulated_recording_is_not_taken_together_with_a_measured_one() -> None:
     measured = PLATE["job.toml"].replace(b'origin = "simulated"\n', b"")
     job = job_of(beside({**PLATE, "job.toml": measured}, gauge=OTHER.read_bytes()))

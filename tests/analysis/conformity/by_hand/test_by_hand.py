@@ -41,6 +41,7 @@ def whole(case: Case) -> bool:
     return case.base[0] in QUICK or ("scatter" in case.recording and "blocks" not in case.base[0]) or some
 
 
+@pytest.mark.usefixtures("no_diagnosis")
 @pytest.mark.long(but="E150")
 @pytest.mark.parametrize("case", [*filter(whole, CASES)], ids=lambda case: case.name)
 def test_the_whole_analysis_states_the_same(case: Case) -> None:
