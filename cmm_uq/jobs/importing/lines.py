@@ -175,12 +175,24 @@ HEADINGS = [
 
 @dataclass
 class AxisRun:
-    """A run along an axis: its sense (0 where nobody knows), its number, and targets in mm with deviations in µm and lines."""
+    """A run along an axis, or a round: sense (0 where nobody knows), number, targets, mm, with deviations, µm, and lines."""
 
     axis: str
     way: int
     number: int
     targets: list[tuple[float, float, int]]
+    across: str = ""  # axis along which deviations lie, where that is another, as of straightness
+    radius: float = 0.0  # mm, of a circle in the plane of two axes, whose targets are angles in °
+
+    def at(self, target: float, start: Floats, direction: Floats) -> tuple[Floats, Floats, Floats]:
+        """Place of a target (3,), direction in which its deviation lies, and signs of travel along the axes."""
+        unit = dict(zip("XYZ", np.eye(3), strict=True))
+        if not self.radius:
+            read = unit[self.across] if self.across else direction
+            return start + target * direction, read, self.way * np.sign(direction) + 0.0
+        (u, v), (cos, sin) = (unit[axis] for axis in self.axis), (f(np.radians(target)) for f in (np.cos, np.sin))
+        outward, along = cos * u + sin * v, cos * v - sin * u
+        return start + self.radius * outward, outward, self.way * np.sign(np.round(along, 9)) + 0.0
 
 
 class UnplacedRunsError(CmmUqError):
@@ -203,18 +215,21 @@ def placed_runs(
     for axis in axes:
         if axis not in places:
             example = axis_place(axis)[1]
-            fix = f'Say it, with the place where its scale reads 0, in mm: lines = {{ "{axis}" = "{example}" }}'
-            problem = f"nothing says where line {axis!r} lies, along which was measured"
+            circle = bool(runs[0].radius)
+            fix = f"Say it, with {'its centre' if circle else 'the place where its scale reads 0'}, in mm: "
+            fix += f'lines = {{ "{axis}" = "{example}" }}'
+            problem = f"nothing says where {'circle' if circle else 'line'} {axis!r} lies, along which was measured"
             error, (target, deviation, _) = UnplacedRunsError(problem, where=where, fix=fix), runs[0].targets[0]
             error.names = [one for one in axes if one not in places]
-            error.example = f"axis {runs[0].axis}, run {runs[0].number}: {target:g} mm, {deviation:+.4g} µm"
+            unit = "°" if circle else " mm"
+            error.example = f"axis {runs[0].axis}, run {runs[0].number}: {target:g}{unit}, {deviation:+.4g} µm"
             raise error
     for run in runs:
         start, direction = place_of(places[run.axis])
         measurement, first = axes.index(run.axis) + 1, 0 if run.way >= 0 else len(run.targets)
-        approach = run.way * np.sign(direction) + 0.0
         for k, (target, deviation, line) in enumerate(run.targets, 1):
-            reading = (*(start + target * direction), deviation, *direction, *approach)
+            xyz, read, approach = run.at(target, start, direction)
+            reading = (*xyz, deviation, *read, *approach)
             rows.append(("", [f"{cell:.10g}" for cell in (measurement, first + k, run.number, *reading)], line))
     return units.sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, _told(axes, places, stated)))
 
@@ -305,8 +320,13 @@ class Rtl(TextReport):
 
 
 def axis_place(name: str) -> tuple[str, str, str]:
-    """Where an axis of runs lies, as far as its name says, and an example: it reads 0 where it lies at 0."""
-    axis = name if name in "XYZ" else ""
+    """Where an axis of runs lies, as far as its name says, and an example: it reads 0 where it lies at 0.
+
+    Of a circle in a plane of two axes the radius at 0° lies along the first of them, from its centre.
+    """
+    if name in ("XY", "YZ", "ZX", "YX", "ZY", "XZ"):
+        return "", f"along {name[0]} from 400,300,200", ""
+    axis = name if name in [*"XYZ"] else ""
     known = ",".join("0" if one == axis else "?" for one in "XYZ")
     begins = ",".join("0" if one == (axis or "X") else str(100 * k) for k, one in enumerate("XYZ", 1))
     example = "from 100,200,300 to 500,600,700" if DIAGONAL.search(name) else f"along {axis or 'X'} from {begins}"

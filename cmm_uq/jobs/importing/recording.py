@@ -25,6 +25,7 @@ from cmm_uq.jobs.importing.factors import hint
 from cmm_uq.jobs.importing.format import Fact, Format, ImportKeys, NotReadError, Recognition, Sheet
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of
 from cmm_uq.jobs.importing.lengths.axis_runs import axis_runs
+from cmm_uq.jobs.importing.lengths.circles import centre_of, circles_of
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, placed, placed_runs
 from cmm_uq.jobs.importing.roles import at_places, said
 from cmm_uq.jobs.importing.tabular import alternatives
@@ -145,16 +146,23 @@ def _understood(
     """A recording of what was understood of a file."""
     head, reading = understood.header, understood.reading
     begun = replace(begun, head=tuple(head_of(understood.grid.sheet.rows[head.row])) if head.row < head.first else ())
-    if reading.kind == "runs":
-        runs = axis_runs(reading, understood.sheets, where)
-        stated = understood.axis_places(runs)
+    if reading.kind in ("runs", "circles"):
+        round_ = reading.kind == "circles"
+        sheets, grid = understood.sheets, understood.grid
+        runs = circles_of(reading, sheets, grid, where) if round_ else axis_runs(reading, sheets, where)
+        stated = centre_of(grid, runs) if round_ else understood.axis_places(runs)
         labels = [label.words for label in reading.every_label if len({*label.values}) > 1]
         sheet = placed_runs(runs, keys, where, understood.passed_over(labels), stated)[0]
         header = header_of(sheet, keys.model_copy(update={"columns": {}}), where, POINTS)
         assert header is not None  # of the head that was written  # noqa: S101
         table = _points(sheet, header, keys, where, reach_mm, begun, points=True)
-        return replace(table, places={axis: place for axis, (place, _) in stated.items()} | keys.lines)
-    lines, places = reading.lines, dict[str, str]()
+        heads_of = dict.fromkeys(COORDINATES, understood.sources["target"]) | {
+            "reading_um": understood.sources["reading_um"]
+        }
+        found = replace(table.recognised, columns={**table.recognised.columns, **heads_of})
+        places = {axis: place for axis, (place, _) in stated.items()} | keys.lines
+        return replace(table, recognised=found, places=places)
+    lines, places = reading.lines, {}
     if reading.kind == "points":
         columns, facts = understood.points(keys, where, reach_mm)
     else:

@@ -29,12 +29,13 @@ from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, 
 from cmm_uq.jobs.importing.grouping import on_a_plate, places
 from cmm_uq.jobs.importing.header import Header, is_summary, shown
 from cmm_uq.jobs.importing.lengths.axis_runs import axis_in
+from cmm_uq.jobs.importing.lengths.circles import circles_in
 from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
 from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of, take_certified
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
 from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, said_elsewhere, stated_places, words_beside
-from cmm_uq.jobs.importing.lengths.run_columns import circle_in, runs_in
+from cmm_uq.jobs.importing.lengths.run_columns import runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths
 from cmm_uq.jobs.importing.numbering import numbered_points
@@ -164,7 +165,7 @@ def _chosen(found: Sequence[Found]) -> list[Found]:
         kinds[reading.kind] += len(reading.figures)
     if kinds["points"] < kinds["lengths"]:  # places of lines, beside lengths that were measured along them
         del kinds["points"]
-    kind = next((kind for kind in ("runs", "points", "lengths") if kind in kinds), "")
+    kind = next((kind for kind in ("circles", "runs", "points", "lengths") if kind in kinds), "")
     chosen = [one for one in found if one[0].kind == kind]
     # deviations of lengths that are there, and small tables beside a large one, are the same again
     chosen = [one for one in chosen if not one[0].deviations] or chosen
@@ -237,8 +238,9 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
                 *(text for row in angles for text in grid.block_of[row].titles[row].values()),
             ]
             found.append((reading, grid))
-        elif own:
-            problem = problem or circle_in(grid, blocks, own)
+        elif own and (circles := circles_in(grid, blocks, own)) is not None:
+            circles.lines = [sheet.lines[row] for row in circles.rows]
+            found.append((circles, grid))
     if problem is not None and not found:
         raise problem
     return found

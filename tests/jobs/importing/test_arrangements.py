@@ -254,7 +254,9 @@ def test_places_round_a_centre_with_their_radii_are_a_circular_test() -> None:
 @pytest.mark.parametrize("head", ["Hoek (graden)", "Angolo [gradi]", "Winkel [°]", "角度"])
 def test_deviations_by_angle_are_a_circular_test(head: str) -> None:
     rows = [f"{5 * k}\t{np.sin(k / 9):.1f}\t{np.cos(k / 7):.1f}" for k in range(72)]
-    assert "circular_test" in problem(["Radial dR (um)", "", f"{head}\tCCW\tCW", *rows])
+    table = ["Radial dR (um)", "", f"{head}\tCCW\tCW", *rows]
+    assert "nothing says the radius" in problem(table)
+    assert "nothing says the plane" in problem(["Radius: 100.0 mm", *table])
 
 
 def test_coarse_places_between_which_lengths_were_measured_are_no_points() -> None:

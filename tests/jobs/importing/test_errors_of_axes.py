@@ -98,21 +98,27 @@ def test_a_direction_of_approach_is_no_line() -> None:
     assert {*table.columns["approach_x"]} == {1.0, -1.0}
 
 
-def test_straightness_is_no_position() -> None:
+@pytest.mark.parametrize(
+    ("title", "across"),
+    [("Straightness vertical", "z"), ("Straightness horizontal", "x"), ("Geradheit Y, Abweichung in Z", "z"),
+     ("Rectitude EXY", "x"), ("真直度 (X)", "x"), ("Straightness", "")],
+)  # fmt: skip
+def test_straightness_lies_across_its_axis(title: str, across: str) -> None:
     rows = [
         f"{t:.3f};" + ";".join(f"{(7 * k + 3 * run * run) % 11 / 10:.2f}" for run in range(4))
         for k, t in enumerate(TARGETS)
     ]
-    with pytest.raises(CmmUqError, match="straightness"):
-        read(
-            [
-                "Test title;Straightness vertical",
-                "Axis;Y",
-                "Error units;micrometres",
-                "Target;Run 1 (+);Run 1 (-);Run 2 (+);Run 2 (-)",
-                *rows,
-            ]
-        )
+    lines = [f"Test title;{title}", "Axis;Y", "Error units;micrometres",
+             "Target;Run 1 (+);Run 1 (-);Run 2 (+);Run 2 (-)", *rows]  # fmt: skip
+    if not across:
+        with pytest.raises(CmmUqError, match="along which axis they lie"):
+            read(lines)
+        return
+    found = imported("\n".join(lines).encode(), "a.csv", ImportKeys(lines={"Y": "along Y from 100,0,300"})).columns
+    assert {name for name in "xyz" if found[f"read_{name}"].any()} == {across}
+    assert {*found[f"read_{across}"].tolist()} == {1.0}
+    assert found["reading_um"][:2].tolist() == [0.0, 0.7]
+    assert {*found["approach_y"].tolist()} == {1.0, -1.0}
 
 
 def test_deviations_are_known_by_their_mean_whatever_they_are_called() -> None:

@@ -84,19 +84,18 @@ EXPECTED = {
 NO_AXIS = "V30"  # runs whose file leaves open which axis was measured
 ASKED = {"C13": "mm", "C26": "mm", "K03": "mm", "K06": "um", "Z14": "mm"}
 """By number: the unit that is asked for beside where lines lie, of files that name none, and have no words of any language."""
+CIRCLES = {"S29": (144, 150, 5.2), "U16": (72, 150, 0.2), "V21": (144, 150, -2.2)}
+"""Circular tests: how many deviations, the radius, mm, and the counter-clockwise deviation at 0°, µm."""
 REFUSED = {
-    "S29": "goes round a circle",
     "T21": "no line names",
     "T22": "no line names",
     "T23": "no column is",
     "T24": "no line names",
-    "U16": "goes round a circle",
     "U21": "may be angles",
     "U22": "nothing says the unit",
     "U23": "each a recording of its own",
     "U24": "nothing says the unit",
     "V08": "no column is",
-    "V21": "goes round a circle",
     "V28": "no line names",
     "V29": "each a recording of its own",
     "W19": "each a recording of its own",
@@ -204,7 +203,19 @@ def test_the_axis_of_runs_that_name_none_is_asked_for() -> None:
         read_with(name, {})
 
 
-@pytest.mark.parametrize("name", [name for name in EXPECTED if number(name) not in {*REFUSED, NO_AXIS}])
+@pytest.mark.parametrize("name", [name for name in EXPECTED if number(name) in CIRCLES])
+def test_a_circular_test_is_read_as_its_author_reads_it(name: str) -> None:
+    count, radius, first = CIRCLES[number(name)]
+    columns = read_with(name, {"lines": {"XY": "along X from 280,230,-150"}}).columns
+    outward = np.column_stack([columns[f"{axis}_mm"] for axis in "xyz"]) - (280, 230, -150)
+    read = np.column_stack([columns[f"read_{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(outward, radius * read, atol=1e-6)
+    at_zero = (np.abs(outward[:, 1]) < 1e-9) & (outward[:, 0] > 0)
+    assert len(outward) == count
+    assert columns["reading_um"][at_zero & (columns["approach_y"] == 1)].tolist() == [first]
+
+
+@pytest.mark.parametrize("name", [name for name in EXPECTED if number(name) not in {*REFUSED, *CIRCLES, NO_AXIS}])
 def test_it_is_read_as_its_author_reads_it(name: str) -> None:
     expected = json.loads(EXPECTED[name].read_text(encoding="utf-8"))
     found, lengths = answered(name)

@@ -23,10 +23,10 @@ _FINEST_UM, _LEAST_UM = 0.002, 0.05  # finer and smaller than machines are known
 def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
     """Runs along axes, each with its targets in turn."""
     figures, labels = np.array(reading.figures), reading.every_label
-    if (angle := _angle_in(reading, sheets)) is not None:
-        fix = "Runs of positions are read; state rotations as reading_arcsec (docs/reference/columns.md)"
-        of = "angles" if factors.says_of(angle) else "of straightness, across the axis"
-        raise NotReadError(f"its deviations may be {of} ({angle!r})", where=where, fix=fix)
+    text = _other_error(reading, sheets)
+    if text is not None and factors.says_of(text):
+        fix = "Runs of positions and of straightness are read; state rotations as reading_arcsec (docs/reference/columns.md)"
+        raise NotReadError(f"its deviations may be angles ({text!r})", where=where, fix=fix)
     stated = reading.unit or unit_elsewhere(sheets, small=False)
     unit = stated or UNITS["mm"]
     small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
@@ -71,7 +71,8 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     runs: dict[tuple[str, int, int], AxisRun] = {}
     rows = zip(target.tolist(), deviation.tolist(), reading.lines, strict=True)
     for one, row in zip(zip(axes, ways, numbers.tolist(), strict=True), rows, strict=True):
-        runs.setdefault(one, AxisRun(*one, [])).targets.append(row)
+        across = _across(one[0], text, reading, sheets, where) if text is not None and one not in runs else ""
+        runs.setdefault(one, AxisRun(*one, [], across)).targets.append(row)
     if any(len({t for t, _, _ in run.targets}) < len(run.targets) for run in runs.values()):
         raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
     return list(runs.values())
@@ -91,7 +92,7 @@ _AXES = "axis|achse|axe|asse|eje|eixo|osa|oś|axel|軸|轴|축"
 _AXIS_NAME = re.compile(rf"(?:{_AXES})\W{{0,3}}([XYZ])\b|\b([XYZ])[- ]?(?:{_AXES})", re.IGNORECASE)
 
 
-def _angle_in(reading: SheetReading, sheets: Sequence[Sheet]) -> str | None:
+def _other_error(reading: SheetReading, sheets: Sequence[Sheet]) -> str | None:
     """A text that says that the deviations which are read are angles; of a whole file where nothing beside them denies it."""
     heads = [text for c in reading.taken["reading_um"] for text in c.path]
     told = any(factors.says_of(text) for text in reading.passed)  # of others
@@ -101,6 +102,31 @@ def _angle_in(reading: SheetReading, sheets: Sequence[Sheet]) -> str | None:
         own += [text for sheet in sheets for row in sheet.rows for text in row if isinstance(text, str)]
     every = dict.fromkeys([*heads, *own])
     return next((text for text in every if factors.says_of(text) or factors.says_of(text, "straight")), None)
+
+
+_ISO_NAME = re.compile(r"(?<![A-Za-z])E\s?_?([XYZ])_?([XYZ])(?![A-Za-z])")  # E_XY is along X where Y moves (ISO 230-1)
+
+
+def _across(axis: str, said: str, reading: SheetReading, sheets: Sequence[Sheet], where: str) -> str:
+    """The axis along which the straightness of another lies: by its symbol, its letter, or as vertical or horizontal."""
+    first = min(reading.rows)
+    rows = [" ".join(map(str, row)) for sheet in sheets for row in sheet.rows[:first]]
+    of_head = [text for c in reading.taken["reading_um"] for text in c.path]
+    told = [*of_head, *(value for label in reading.every_label for value in {*label.values}), *rows]
+    sure = any(said in text for text in told) and not any(factors.says_of(text, "linear") for text in told)
+    for text in told if sure else ():
+        if (match := _ISO_NAME.search(text)) and match[1] != match[2] == axis:
+            return str(match[1])
+    known = ("vertical", "horizontal")
+    about = [text for text in told if factors.says_of(text, "straight", *known)]
+    letters = {letter for text in about for letter in re.findall(r"(?<![^\W_])[XYZ](?![^\W_])", text)} - {axis}
+    if sure and len(letters) == 1 and len(axis) == 1:
+        return str(letters.pop())
+    ways = {way for way in known for text in about if factors.says_of(text, way)}
+    if sure and len(ways) == 1 and axis in ("X", "Y") and not letters:
+        return "Z" if ways == {"vertical"} else "Y" if axis == "X" else "X"
+    what = f"its deviations are of straightness ({said!r}), and nothing says along which axis they lie"
+    raise NotReadError(what, where=where, fix='Write it above the table, as "Straightness of Y, deviation along Z"')
 
 
 def axis_in(text: str) -> str:

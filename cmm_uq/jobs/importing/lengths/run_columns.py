@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,15 +9,11 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.blocks import Block, CutSheet
-from cmm_uq.jobs.importing.coordinates import OF_CIRCLES
 from cmm_uq.jobs.importing.factors import RUN, hint, says_of, senses, way_of, ways_of
-from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.lengths.evidence import differences, families, follows, scatters, without_derived
 from cmm_uq.jobs.importing.lengths.length_columns import WIDEST, of_one_sort, settled_base
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, like
 
-_MOST_OF_A_TURN = 300
-_DEGREES = re.compile(r"°|度|\b(?:deg|gra[dus]|stop|stup)", re.IGNORECASE)
 _FEWEST = 3  # targets of an axis
 _WIDER = 20  # times, that targets are farther apart than their deviations
 _OFF_MM = 1.0  # farther from its target no axis comes to rest
@@ -133,14 +128,3 @@ def _reached(columns: Sequence[FigureColumn], target: FigureColumn, values: Floa
     near = [c for c in columns if c is not target and c.role not in ("summary", "deviation")]
     near = [c for c in near if c.step < 1 and like(c.values, values, _OFF_MM)]
     return without_derived(near) if np.nanmax(np.abs(values)) > 10 * _OFF_MM else []
-
-
-def circle_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> NotReadError | None:
-    """The error for radii by angle, which are of a circular test, and no places."""
-    columns = columns_in(grid, blocks, rows)
-    spans = ((c.heading, np.nanmax(c.values) - np.nanmin(c.values)) for c in columns if _DEGREES.search(c.heading))
-    name = next((name for name, span in spans if span > _MOST_OF_A_TURN), None)
-    if name is None or len(columns) < 2:
-        return None
-    what = f"{name!r} goes round a circle, as in circular tests, and nothing says its points"
-    return NotReadError(what, where=grid.at(rows[0]), fix=OF_CIRCLES)
