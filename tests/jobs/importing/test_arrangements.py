@@ -281,3 +281,13 @@ def test_an_alignment_named_above_the_one_table_leaves_nothing_out() -> None:
             for a, v in zip("XYZ", (130.0 * k, k * k, 7 - k), strict=True)
         ]
         assert len(read(["Alignment;Machine", *between, "Name;Control;Meas", *coordinates], unit="mm").lines) == 8
+
+
+def test_an_angle_that_rises_clockwise_may_be_counted_either_way() -> None:
+    rows = [f"{5 * k};{np.sin(k / 9):.1f}" for k in range(72)]
+    lines = ["Radius (mm);100", "Plane;XY", "Run 1 CW", "Angle (deg);Deviation (um)", *rows]
+    assert "may be counted the way that it goes" in problem(lines)
+    keys = ImportKeys(lines={"XY": "along X from 0,0,0"})
+    found = imported("\n".join(lines).replace("CW", "CCW").encode(), "a.csv", keys)
+    np.testing.assert_allclose(found.columns["y_mm"][18], 100.0)
+    assert found.columns["approach_x"][18] == -1.0
