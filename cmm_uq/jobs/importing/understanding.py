@@ -112,7 +112,7 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     grid = chosen[0][1]
     whole = joined([reading for reading, _ in chosen])
     if both := next((label.values for label in whole.every_label if len(states_of({*label.values})) > 1), None):
-        what = f"{', '.join(map(repr, dict.fromkeys(both)))} are of a machine before and after it was adjusted, each a recording of its own"
+        what = f"{', '.join(map(repr, dict.fromkeys(both)))} are of a machine before and after it was adjusted: two recordings"
         raise NotReadError(what, where=where, fix="Name the columns of one of them, or export one of them")
     take_certified(whole, [*map(CutSheet, upright)])
     return Understanding(whole, sheets, without, grid, chosen, elsewhere, across=grid in across)
