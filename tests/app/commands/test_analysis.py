@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 from benchmarks.coverage.stated_doubt import held, recorded
-from cmm_uq.app.commands.diagnose import diagnosis_outcome
-from cmm_uq.app.commands.reading import job_of, read_job
+from cmm_uq.app.commands.diagnose import outcome_of as diagnosis_page
+from cmm_uq.app.commands.reading import job_of
 from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.artefacts.ballbar import results as bar_results
 from cmm_uq.artefacts.gauge_lines_page import figures
@@ -22,7 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.machine.model.artefact_doubt import CALIBRATION
-from tests.artefacts.simulated import analysed
+from tests.artefacts.simulated import analysed, diagnosis_of
 from tests.conftest import ROOT, without_diagnosis
 
 EXAMPLES = ROOT / "examples"
@@ -320,7 +320,7 @@ EXAMPLE = ROOT / "examples" / "iota-1102-20C"
 @cache
 def outcome() -> Outcome:
     """Of the real bars."""
-    return diagnosis_outcome(read_job(EXAMPLE))
+    return diagnosis_page(diagnosis_of("iota-1102-20C"))
 
 
 def test_agreement_without_power_is_said_to_be_so_and_stays_consistent() -> None:

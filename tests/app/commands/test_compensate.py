@@ -61,6 +61,7 @@ def test_the_compensated_job_is_not_compensated_again_and_tells_its_source(job: 
     assert told["error_maps"][0]["squareness_arcsec"] == {"xy": -173.0, "yz": -19.0, "zx": 21.0}
 
 
+@pytest.mark.usefixtures("no_diagnosis")
 def test_the_thesis_map_brings_the_rms_accuracy_error_to_12_6_micrometres(job: Path, tmp_path: Path) -> None:
     """Harris 2004 prints 12.8 µm for its own compensation, which also knew the digitizer's pose."""
     source = ROOT.parent / "shared" / "data" / "harris2004" / "error_map_20C.csv"

@@ -32,6 +32,7 @@ coordinate_um = 1.0
 """
 
 
+@pytest.mark.usefixtures("no_diagnosis")
 def test_a_simulated_job_reports_the_truth_within_its_intervals(iota: Path, tmp_path: Path) -> None:
     """Five standard uncertainties: among seven figures a wrong alarm comes once in 250 000 such tests."""
     (tmp_path / "truth.toml").write_text(TRUTH)

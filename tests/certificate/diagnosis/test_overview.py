@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -12,15 +13,16 @@ import numpy as np
 import pytest
 
 import cmm_uq
+from cmm_uq.analysis.conformity.accuracy import consequences, costs
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.diagnosis.asserted import AlternativeSet
 from cmm_uq.analysis.diagnosis.diagnosis import ModelAverage, Rival
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionTerm
 from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalFunction, EmpiricalModel, NamedForm
 from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.simulated import SimulationMistakes
 from cmm_uq.analysis.planning.set_up import DetectionChange, NextPlan, Separation
-from cmm_uq.app.commands.diagnose import diagnose_read
-from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts import artefact_facts, artefact_of
+from cmm_uq.artefacts import artefact_facts, artefact_of, kind_of
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
@@ -35,7 +37,6 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.constructions import plate
 from tests.artefacts.simulated import diagnosed, diagnosis_of
 from tests.certificate.saying import leaves
-from tests.conftest import ROOT
 
 IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")  # words that no technician says
 
@@ -52,14 +53,15 @@ def consistent() -> JobDiagnosis:
 
 
 @pytest.fixture(scope="module")
-def explained(tmp_path_factory: pytest.TempPathFactory) -> JobDiagnosis:
-    """The real recording, its squareness of X and Y left out."""
-    folder = tmp_path_factory.mktemp("left out")
-    for file in (ROOT / "examples" / "iota-1102-20C").iterdir():
-        (folder / file.name).write_bytes(file.read_bytes())
-    text = (folder / "job.toml").read_text("utf-8")
-    (folder / "job.toml").write_text(text.replace('"squareness_xy", ', ""), encoding="utf-8")
-    return diagnose_read(read_job(folder))
+def explained() -> JobDiagnosis:
+    """The real recording, its squareness of X and Y in no model: what it has against a simulation without it, as its own."""
+    found = diagnosis_of("iota-1102-20C-against-simulation")
+    assert isinstance(found, JobDiagnosis)
+    job, kind = found.job, kind_of(found.job)
+    observe = partial(kind.observing("diagnosed"), job.facts.artefact, where=job.recording_path)
+    given = (job, found.diagnosis, observe, kind.tested, 0, OutsideReadings.of(job.points, found.findings, observe))
+    own = replace(found, simulated=None, mistakes=SimulationMistakes())
+    return replace(own, consequences=consequences(*given), costs=costs(*given))
 
 
 def modelled(found: JobDiagnosis, form: NamedForm | None, *, predicts: bool = True) -> JobDiagnosis:

@@ -75,6 +75,7 @@ IN_MACHINE = 'table = { coordinates = "machine", axis_mm = [450, 600, 0] }'
 ANGLES = np.array([0.0, 40.0, 90.0, 200.0, 310.0])
 
 
+@pytest.mark.usefixtures("no_regions", "no_diagnosis")
 @pytest.mark.long(but="axis_mm")
 @pytest.mark.parametrize(("table", "recorded"), [(ON_TABLE, on_table), (IN_MACHINE, in_machine)])
 def test_errors_of_carriages_are_found_through_a_plate_that_turns_with_the_table(

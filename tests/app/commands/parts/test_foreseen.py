@@ -20,7 +20,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.budget_section import foreseen_table, foreseen_words
 from cmm_uq.certificate.part.measurement import PartMeasurement, part_results
 from cmm_uq.jobs.part.job import read_part
-from tests.conftest import ROOT
+from tests.conftest import ROOT, without_diagnosis
 from tests.part_reports import drawn_once
 
 PART, CALIBRATION, PLAN = "part-methods-simulated", "bryan-simulated", "plan-step-gauge"
@@ -28,7 +28,7 @@ PART, CALIBRATION, PLAN = "part-methods-simulated", "bryan-simulated", "plan-ste
 
 @pytest.fixture(scope="module")
 def found() -> Iterator[PartMeasurement]:
-    with pytest.MonkeyPatch.context() as patched:
+    with pytest.MonkeyPatch.context() as patched, without_diagnosis():
         drawn_once(patched)
         yield evaluate_part(read_part(ROOT / "examples" / PART), PartOptions(trials=4000))
 
