@@ -5,6 +5,8 @@ Kinematics are products of matrix exponentials (SciPy) of the screw axes, whatev
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.linalg import expm, subspace_angles
@@ -47,21 +49,29 @@ def _skew(w: Floats) -> Floats:
     return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
 
 
+@cache
+def motion(direction: tuple[float, ...], through: tuple[float, ...], turns: bool, amount: float) -> Floats:
+    """(4, 4) e^ξq of one axis."""
+    w, twist = np.array(direction), np.zeros((4, 4))
+    if turns:
+        twist[:3, :3] = _skew(w)
+        twist[:3, 3] = -np.cross(w, through)
+    else:
+        twist[:3, 3] = w
+    return np.asarray(expm(twist * amount))
+
+
 def exact(screws: Screws, q: Floats, tool: Floats = TOOL) -> Floats:
     """(n, 3) e^ξ₁q₁ … e^ξ₆q₆·M·tool for readings (n, 6) rad or mm."""
     directions, through, revolute = screws
+    axes = [*zip(map(tuple, unit(directions)), map(tuple, through), map(bool, revolute), strict=True)]
+    last = home() @ np.append(tool, 1.0)
     found = []
     for one in q:
         frame = np.eye(4)
-        for w, p, turns, amount in zip(unit(directions), through, revolute, one, strict=True):
-            twist = np.zeros((4, 4))
-            if turns:
-                twist[:3, :3] = _skew(w)
-                twist[:3, 3] = -np.cross(w, p)
-            else:
-                twist[:3, 3] = w
-            frame = frame @ expm(twist * amount)
-        found.append((frame @ home() @ np.append(tool, 1.0))[:3])
+        for axis, amount in zip(axes, one, strict=True):
+            frame = frame @ motion(*axis, float(amount))
+        found.append((frame @ last)[:3])
     return np.array(found)
 
 
