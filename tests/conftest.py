@@ -60,6 +60,13 @@ FIRST = (
     "app/cli/test_report.py", "analysis/diagnosis/test_diagnosis.py",
 )  # fmt: skip
 """Files that take longest, longest first: each runs on one core, so none is to be begun when the others are done."""
+WAITING = (
+    "laboratory/live/instruments/test_instrument.py", "base/output/test_staging.py",
+    "laboratory/live/instruments/test_profile.py", "laboratory/live/instruments/test_pt104.py",
+    "laboratory/live/instruments/test_ipp.py", "app/serve/test_slow_clients.py", "base/output/test_interruption.py",
+    "app/serve/test_server.py", "laboratory/schedule/test_settings.py",
+)  # fmt: skip
+"""Files whose tests wait for clocks and disks: they do it while types are checked beside them, which then has their core."""
 TOGETHER = {"tests.artefacts.simulated": "examples", "tests.part_": "parts", "tests.sources": "sources",
             "tests.catalogues": "sources"}  # fmt: skip
 """What runs in one process, by what a file says: what takes long to make, and only a process keeps, is made once."""
@@ -149,8 +156,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             for mark, starters in STARTERS.items():
                 if named & starters:
                     item.add_marker(mark)
-    first = {ROOT / "tests" / name: place for place, name in enumerate(FIRST)}
-    items.sort(key=lambda item: (first.get(item.path, len(FIRST)), item.path.parts))
+    order = (*FIRST[:1], *WAITING, *FIRST[1:])  # of two processes one begins with the longest, and the other waits
+    first = {ROOT / "tests" / name: place for place, name in enumerate(order)}
+    items.sort(key=lambda item: (first.get(item.path, len(order)), item.path.parts))
 
 
 def pytest_collection_finish() -> None:
