@@ -367,7 +367,7 @@ def test_where_a_hole_truly_is_follows_from_where_it_was_measured(common: float,
     noise = PointScatter.of("noise", "reading", np.sqrt(2) * 1e-3 * own * of_hole)
     measured = plan.points + 1e-3 * off_um * of_hole * [1, 0, 0]
     given = MeasurementConditions(machine(), (POSE,), further=(noise,), measured=measured)
-    true = evaluated(plan, measured) - Virtual(plan, given).errors(np.random.default_rng(0), 100_000)
+    true = evaluated(plan, measured) - Virtual(plan, given).errors(np.random.default_rng(0), 25_000)
     s = np.hypot(common, own)
     for limit in (1.0, 2.0, 3.0):
         expected = ncx2.sf((off_um / s) ** 2, 2, (limit / s) ** 2) if off_um else 1.0
