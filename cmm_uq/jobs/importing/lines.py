@@ -23,15 +23,7 @@ from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.columns import COORDINATES
 from cmm_uq.jobs.importing import format as units
-from cmm_uq.jobs.importing.format import (
-    LINE_PLACE,
-    SAME_PLACE,
-    UNITS,
-    Fact,
-    ImportKeys,
-    Row,
-    Sheet,
-)
+from cmm_uq.jobs.importing.format import LINE_PLACE, SAME_PLACE, UNITS, Fact, ImportKeys, Row, Sheet
 from cmm_uq.jobs.importing.lengths.placing import DIAGONAL, place_of_axis
 from cmm_uq.jobs.importing.reports import TextReport
 

@@ -173,6 +173,7 @@ class SheetReading:
     summaries: list[int] = field(default_factory=list)  # rows of another table, of means of this one
     beside: list[Labels] = field(default_factory=list)  # of each row
     further: dict[str, Floats] = field(default_factory=dict)
+    told: Sequence[str] = ()  # of rows that are left out: where, and why
 
     @property
     def source(self) -> list[FigureColumn]:

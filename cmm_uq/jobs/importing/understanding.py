@@ -103,6 +103,7 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     apart = [(grid.sheet, reading) for reading, grid in found if all(grid is not other for _, other in chosen)]
     without = [told for sheet in sheets for told in sheet.left_out]
     without += [shown(sheet, reading.rows[0], "another table") for sheet, reading in apart]
+    without += [text for reading, _ in chosen for text in reading.told]
     _take_results(found, chosen)
     for grid in {id(own): own for _, own in chosen}.values():
         if (told := left_out.rows_left_out([reading for reading, own in chosen if own is grid], grid)) is None:
@@ -212,7 +213,8 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
         places = (*(() if across else (rows_of_axes,)), points_in) if {*grid.keys} <= {*WHOLE} else ()
         lengths = (runs_in, lengths_in)  # before their places, which may stand beside them
         placed = grid.placed(own)
-        for read in (lengths + places if placed else places + lengths) if own else ():
+        every = (*(() if across else (circles_in,)), *(lengths + places if placed else places + lengths))
+        for read in every if own else ():
             try:
                 of_places = [row for row in own if not left_out.of_feature(grid, row)] or own
                 reading = read(grid, blocks, own if read in lengths else of_places)
@@ -237,9 +239,6 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
                 *(text for row in angles for text in grid.block_of[row].titles[row].values()),
             ]
             found.append((reading, grid))
-        elif own and (circles := circles_in(grid, blocks, own)) is not None:
-            circles.lines = [sheet.lines[row] for row in circles.rows]
-            found.append((circles, grid))
     if problem is not None and not found:
         raise problem
     return found

@@ -291,3 +291,36 @@ def test_an_angle_that_rises_clockwise_may_be_counted_either_way() -> None:
     found = imported("\n".join(lines).replace("CW", "CCW").encode(), "a.csv", keys)
     np.testing.assert_allclose(found.columns["y_mm"][18], 100.0)
     assert found.columns["approach_x"][18] == -1.0
+
+
+def test_both_senses_of_a_circle_are_told_by_heads_or_a_column() -> None:
+    head, keys = ["Kreisformtest", "Nennradius (mm);100,0", "Ebene;ZX"], ImportKeys(lines={"ZX": "along Z from 1,2,3"})
+    wide = [f"{5 * k};{100 + k / 1e4:.4f};{100 - k / 1e4:.4f}".replace(".", ",") for k in range(72)]
+    across = [*head, "Winkel [°];Radius im Uhrzeigersinn [mm];Radius gegen Uhrzeigersinn [mm]", *wide]
+    long = [f"ZX;{way};{5 * k};{sign * k / 10:.1f}".replace(".", ",")
+            for way, sign in (("Uhrzeigersinn", 1), ("gegen Uhrzeigersinn", -1)) for k in range(72)[::-sign]]  # fmt: skip
+    down = [*head, "Ebene;Sinn;Winkel (°);Radiale Abweichung (µm)", *long]
+    for lines in (across, down):
+        found = imported("\n".join(lines).encode(), "a.csv", keys).columns
+        np.testing.assert_allclose(np.hypot(found["z_mm"] - 3, found["x_mm"] - 1), 100.0)
+        at_right = (found["read_x"] == 1.0) & (found["reading_um"] > 0)  # 90°: towards X, clockwise by its sign
+        assert found["reading_um"][at_right].round(6).tolist() == [1.8]
+        assert found["approach_z"][at_right].tolist() == [1.0]
+
+
+def test_angles_beyond_the_arc_that_is_said_are_left_out() -> None:
+    rows = [f"{angle};{angle / 100:.2f}" for angle in range(-90, 315, 5)]
+    lines = ["Ballbar", "Radius (mm);100", "Plane;XY", "Overshoot", "CCW", "Angle (deg);Deviation (um)", *rows]
+    assert "which arc" in problem(lines)
+    lines[3] = "Start/end angle (deg);-60 / 300"
+    found = imported("\n".join(lines).encode(), "a.csv", ImportKeys(lines={"XY": "along X from 0,0,0"}))
+    assert len(found.lines) == 73
+    assert found.columns["reading_um"].tolist()[0] == -0.6
+    assert any("8 of angles" in fact.value for fact in found.recognised.facts)
+
+
+def test_how_round_a_ring_is_is_no_circular_test() -> None:
+    rows = [f"{5 * k};{np.sin(k / 9):.2f}" for k in range(73)]
+    lines = ["Roundness of a ring, XY", "Radius (mm);25", "Angle [deg];Radial deviation [um]", *rows]
+    assert "no " in problem(lines)
+    assert "the plane of the circle" in problem(["Ballbar", *lines[1:2], "Plane;XZ CCW", *lines[2:]])

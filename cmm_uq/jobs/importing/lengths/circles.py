@@ -8,20 +8,24 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing import format as units
 from cmm_uq.jobs.importing.blocks import Block, CutSheet
 from cmm_uq.jobs.importing.cells.figures import figure, unit_elsewhere, unit_of
-from cmm_uq.jobs.importing.factors import RUN, counted
+from cmm_uq.jobs.importing.coordinates import EitherError
+from cmm_uq.jobs.importing.factors import RUN, counted, says_of as of_angle
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, NotReadError, Sheet, unit_named
 from cmm_uq.jobs.importing.header import plain_words, unspaced, words_of
 from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
 from cmm_uq.jobs.importing.lengths.places import said_in
 from cmm_uq.jobs.importing.lines import AxisRun
-from cmm_uq.jobs.importing.roles import SheetReading, columns_in
+from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in
 
 _DEGREES = re.compile(r"°|度|\b(?:deg|gra[dus]|stop|stup)|각도", re.IGNORECASE)
 _MOST_OF_A_TURN, _TURN = 300.0, 360.0
-_PLANE = re.compile(r"(?<![A-Za-z])(XY|YZ|ZX|XZ|YX|ZY)(?![A-Za-z])")
+_ARC = re.compile(r"(-?\d+(?:\.\d+)?)\s*°?\s*(?:/|\.{2,3}|–|→|\b[^\W\d]{1,3}\b)\s*(-?\d+(?:\.\d+)?)")
+_PLANE = re.compile(r"(?<![A-Za-z])(XY|YZ|ZX|XZ|YX|ZY|G17|G18|G19)(?![A-Za-z])")
+_LARGEST_MM = 2000.0
 _LEAST_MM = 5.0  # of a radius; deviations are smaller
 _FIGURE = re.compile(r"([^\W\d][^\d;]{0,40}?(?:\([^)]{1,12}\))?)[\s:;=]{1,20}(\d[\d.,]*)\s*([^\W\d]*)")
 _POINT = re.compile(r"^\d+\.(?:\d{1,2}|\d{4,})$")  # of decimals, whatever the figures of the table have
@@ -39,27 +43,31 @@ def circles_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
     if angle is None or len(rows) < _FEWEST:
         return None
     beside = [c for c in columns if c is not angle and c.may_be_length and c.role != "summary" and not c.counts]
+    flags = [c for c in columns if {*c.values[np.isfinite(c.values)].tolist()} == {0.0, 1.0}]
+    beside = [c for c in beside if c not in flags and not any(map(of_angle, c.path))]
     source = [c for c in beside if sense_of(c.path)] or [
         c for c in beside if c.minute or c.role in ("deviation", "measured")
     ]
     source = source or beside
     if not source or (len(source) > 1 and len({c.heading for c in source}) < len(source)):
         return None
+    texts = [grid.line(row) for row in range(len(grid.sheet.rows))]
+    if not any(map(sense_of, (c.path for c in source))) and not any(says(t, "test") or sense_of([t]) for t in texts):
+        return None  # as how round a ring is
     if len(source) > 1 and not all(sense_of(c.path) for c in source):
         what = f"{', '.join(repr(c.heading) for c in source[:3])} may be the radial deviations"
-        raise NotReadError(what, where=grid.at(rows[0]), fix="Say which way round each goes: CW, or CCW")
+        raise EitherError(what, where=grid.at(rows[0]), fix="Say which way round each goes: CW, or CCW")
     reading = SheetReading("circles", small=next((c.unit for c in source if c.unit), None))
     reading.taken = {"target": [angle], "reading_um": source}
     reading.collect(grid, rows, columns)
-    caught = next(
-        (c for c in columns if c not in source and {*c.values[np.isfinite(c.values)].tolist()} == {0.0, 1.0}), None
-    )
+    inside = _inside(angle.values, flags, texts, grid.at(rows[0]))
+    beyond = [row for row, own in zip(rows, inside, strict=True) if own is False]
+    reading.others = beyond
+    if beyond:
+        lines = [grid.sheet.lines[row] for row in beyond]
+        reading.told = [f"lines {min(lines)} to {max(lines)}: {len(lines)} of angles ahead of the circle, or behind it"]
     for k, row in enumerate(rows):
-        if not np.isfinite(angle.values[k]):
-            continue
-        run_in = not 0 <= angle.values[k] <= _TURN or (caught is not None and caught.values[k] == 0)
-        reading.summaries += [row] if run_in else []  # ahead of the circle, and behind it
-        for c in () if run_in else source:
+        for c in source if inside[k] else ():
             if np.isfinite(c.values[k]):
                 reading.add(row, k, c, source, (float(angle.values[k]), float(c.values[k])))
             else:
@@ -67,22 +75,49 @@ def circles_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
     return reading if reading.figures else None
 
 
+def _inside(angles: Floats, flags: Sequence[FigureColumn], texts: Sequence[str], place: str) -> list[bool | None]:
+    """Whether each is of the circle, by a column of 0 and 1 or by the arc that a text says; ``None`` without angle."""
+    there = np.isfinite(angles) & np.isfinite(flags[0].values if len(flags) == 1 else angles)
+    low, high = float(angles[there].min()), float(angles[there].max())
+    arcs = [(float(m[1]), float(m[2])) for text in texts for m in _ARC.finditer(text.replace(",", "."))]
+    arcs = [*{(a, b) for a, b in map(sorted, arcs) if low <= a and b <= high and _MOST_OF_A_TURN < b - a <= _TURN}]
+    if len(flags) == 1:
+        own = flags[0].values != (0 if not says(flags[0].heading, "overshoot") else 1)
+    elif high - low <= _TURN:
+        own = there
+    elif len(arcs) == 1:
+        own = (angles >= arcs[0][0]) & (angles <= arcs[0][1])
+    else:
+        what = f"its angles go from {low:g}° to {high:g}°, and nothing says which arc of them is the circle"
+        raise EitherError(what, where=place, fix="Write it above: Start/end angle (deg): 0 / 360")
+    return [bool(one) if known else None for one, known in zip(own.tolist(), there.tolist(), strict=True)]
+
+
+def says(text: str, table: str) -> bool:
+    """Whether a text has words of a table of circles."""
+    plain = f" {' '.join(plain_words(text))} "
+    return any(f" {one} " in plain or (unspaced(one) and one in plain) for one in words_of("circles")[table])
+
+
 def sense_of(texts: Iterable[str]) -> int:
-    """+1 counter-clockwise, −1 clockwise, by words; 0 where none says it."""
-    plain = [f" {' '.join(plain_words(text))} " for text in texts]
-    for name, sense in (("ccw", 1), ("cw", -1)):  # whose words are among those of the other
-        if any(
-            f" {one} " in text or (unspaced(one) and one in text) for one in words_of("circles")[name] for text in plain
-        ):
-            return sense
-    return 0
+    """+1 counter-clockwise, −1 clockwise, by words, those for the one taken out of those for the other; 0 of none or both."""
+    found = set[int]()
+    for text in texts:
+        plain = f" {' '.join(plain_words(text))} "
+        words = ((one, sense) for name, sense in (("ccw", 1), ("cw", -1)) for one in words_of("circles")[name])
+        for one, sense in sorted(words, key=lambda word: (-len(word[0]), -word[1])):
+            if (own := one if unspaced(one) else f" {one} ") in plain:
+                found.add(sense)
+                plain = plain.replace(own, "  ")
+    return found.pop() if len(found) == 1 else 0
 
 
 def circles_of(reading: SheetReading, sheets: Sequence[Sheet], grid: CutSheet, where: str) -> list[AxisRun]:
     """Each round with its angles and deviations in turn."""
     texts = [cell for sheet in sheets for row in sheet.rows for cell in row if isinstance(cell, str)]
     radius = _radius(grid, min(reading.rows), where)
-    labels = [one for one in reading.every_label if one.sort != "column" or counted(one, lengths=True) == RUN]
+    labels = [one for one in reading.every_label if one.sort != "column" or counted(one, lengths=True) == RUN
+              or all(sense_of([value]) or _plane([value]) for value in {*one.values})]  # fmt: skip
     named = [tuple(label.values[k] for label in labels) for k in range(len(reading.figures))]
     series = {key: [k for k, own in enumerate(named) if own == key] for key in dict.fromkeys(named)}
     values, rounds = np.array(reading.figures), Counter[tuple[str, int]]()
@@ -94,9 +129,10 @@ def circles_of(reading: SheetReading, sheets: Sequence[Sheet], grid: CutSheet, w
                 "a round has an angle twice, or few angles", where=where, fix="Number the rounds in a column"
             )
         plane = _plane(key) or _plane(texts)
-        of_head = [text for text, label in zip(key, labels, strict=True) if label.sort == "head"]
-        if not plane:
-            raise NotReadError("nothing says the plane of the circle", where=where, fix='Write it above: "Plane;XY"')
+        of_head = [text for text, label in zip(key, labels, strict=True) if label.sort in ("head", "column")]
+        if plane in ("", "XZ", "YX", "ZY"):  # of which nobody knows where its angles begin, and which way they go
+            what = f"nothing says the {'way of angles in the ' if plane else ''}plane of the circle"
+            raise NotReadError(what, where=where, fix='Write it above, as its angles go: "Plane;XY", "YZ" or "ZX"')
         sense = (
             sense_of(of_head)
             or sense_of(key)
@@ -124,7 +160,8 @@ def circles_of(reading: SheetReading, sheets: Sequence[Sheet], grid: CutSheet, w
 
 
 def _plane(texts: Iterable[str]) -> str:
-    found = {match[1] for text in texts for match in _PLANE.finditer(text)}
+    codes = {"G17": "XY", "G18": "ZX", "G19": "YZ"}
+    found = {codes.get(match[1], match[1]) for text in texts for match in _PLANE.finditer(text)}
     return found.pop() if len(found) == 1 else ""
 
 
@@ -139,7 +176,12 @@ def _radius(grid: CutSheet, first: int, where: str) -> float:
             last = (words or ("",))[-1]  # as Teststraal, in which the word stands behind another
             said = any(f" {one} " in ahead or (len(one) > len("sade") and last.endswith(one)) for one in known)
             unit = unit_of([match[1]]) or unit_named(match[3]) or UNITS["mm"]
-            if said and own is not None and unit.sort == LENGTH and own[0] * unit.metres * 1000 >= _LEAST_MM:
+            if (
+                said
+                and own is not None
+                and unit.sort == LENGTH
+                and _LEAST_MM <= own[0] * unit.metres * 1000 < _LARGEST_MM
+            ):
                 return own[0] * unit.metres * 1000
     raise NotReadError("nothing says the radius of the circle", where=where, fix='Write it above: "Radius (mm);150"')
 
