@@ -20,6 +20,7 @@ from cmm_uq.jobs.importing.cells.figures import SMALL, figure
 from cmm_uq.jobs.importing.factors import hint, says_of
 from cmm_uq.jobs.importing.format import NotReadError
 from cmm_uq.jobs.importing.header import without_unit
+from cmm_uq.jobs.importing.lengths.evidence import spread
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, at_places, columns_in, like, said_by, words_above
 
 _MOST = 0.8  # of figures: where fewer are there, they may be of something else
@@ -35,8 +36,6 @@ _LETTER = re.compile(r"(?<![A-Za-zÀ-ɏ])([xyzXYZ])(?![A-Za-zÀ-ɏ])")
 _EQUAL = re.compile(r"\s*[=:]\s*[-+]?\d")
 _LEVEL = re.compile(r"(?<![^\W\d_])([XYZ])\s*[=:]\s*([-+]?\d+(?:[.,]\d+)?)(?![^\s;)])")
 _COUNTED = re.compile(r"\d+|(?<![^\W\d_])[A-Za-z](?![^\W\d_])")
-
-
 OF_CIRCLES = "Give x_mm, y_mm and z_mm, from radius and angle (docs/reference/columns.md, circular_test)"
 
 
@@ -68,6 +67,8 @@ class Triple:
     def wide(self) -> bool:
         """Whether they are as far apart as places are, and deviations are not."""
         unit, extent = self.columns[0].unit, np.nanmax(self.values, axis=0) - np.nanmin(self.values, axis=0)
+        if self.role == "deviation" and unit is not None and unit.name in SMALL:
+            return False  # however large
         return bool(extent.max() > _WIDE or (unit is not None and unit.name not in SMALL and extent.max() > 0))
 
     @property
@@ -198,17 +199,15 @@ def _named(columns: Sequence[FigureColumn], levels: Mapping[str, float]) -> list
         for match in re.finditer("[xyzXYZ]", text):
             rest = text[: match.start()].casefold(), text[match.end() :].casefold()
             found.setdefault(rest, {}).setdefault(match[0].lower(), []).append(c)
+    flat = not levels and not any("z" in own for own in found.values())
     for own in found.values() if all(len(own) < 3 for own in found.values()) else ():
-        if len(axes := {*"xyz"} - {*own}) == 1 and (axis := axes.pop()) in levels:
-            (first, *_) = own.values()
+        if len(axes := {*"xyz"} - {*own}) == 1 and (
+            (axis := axes.pop()) in levels or (flat and axis == "z" and spread(own.values(), _WIDE))
+        ):
+            (first, *_), level = own.values(), levels.get(axis, 0.0)
+            path = [f"{axis.upper()} = {level:g}" if axis in levels else "0, as the file has no Z"]
             own[axis] = [
-                replace(
-                    c,
-                    i=-1,
-                    path=[f"{axis.upper()} = {levels[axis]:g}"],
-                    values=c.values * 0 + levels[axis] * (np.ptp(c.values) > _WIDE),
-                )
-                for c in first
+                replace(c, i=-1, path=path, values=c.values * 0 + level * (np.ptp(c.values) > _WIDE)) for c in first
             ]
     parts = [rest for rest, own in found.items() if len(own) < 3]
     for a, b in permutations(parts, 2):
@@ -310,13 +309,19 @@ def _summed(nominal: Sequence[Triple], deviations: Sequence[Triple], where: str)
     if len(nominal) > 1:
         what = f"{nominal[0].shown} and {nominal[1].shown} may both be the nominal values of what was measured"
         raise EitherError(what, where=where, fix="Keep the columns of one of them, with their deviations")
-    if not nominal or len(deviations) != 1 or len(nominal[0].columns) != len(deviations[0].columns):
-        return []
-    nom, dev = nominal[0], deviations[0]
-    factors = [d.factors(n) for d, n in zip(dev.columns, nom.columns, strict=True)]
-    if any(one != factors[0] for one in factors) or len(factors[0]) > 1 < len({c.unit for c in dev.columns}):
-        return []
-    return [replace(nom, values=nom.values + dev.values * factors[0][0], summed=True)]
+    found: list[Triple] = []
+    for dev in deviations if nominal else ():  # of one pass, or of several side by side
+        pairs = [*zip(dev.columns, nominal[0].columns, strict=False)]
+        factors = [d.factors(n) for d, n in pairs]
+        if len(dev.columns) != len(nominal[0].columns) or any(one != factors[0] for one in factors):
+            return []
+        if len(factors[0]) > 1 < len({c.unit for c in dev.columns}):
+            return []
+        whole = nominal[0].values + dev.values * factors[0][0]
+        each = tuple(replace(d, unit=n.unit, step=n.step) for d, n in pairs)
+        one = replace(nominal[0], values=whole, summed=True)
+        found.append(one if len(deviations) == 1 else replace(one, columns=each, head=dev.head))
+    return found
 
 
 def _rigid(triples: Sequence[Triple]) -> bool:

@@ -26,6 +26,7 @@ from cmm_uq.jobs.importing.format import Fact, Format, ImportKeys, NotReadError,
 from cmm_uq.jobs.importing.header import LINES_BEFORE, POINTS, REFERENCES, Header, header_of
 from cmm_uq.jobs.importing.lengths.axis_runs import axis_runs
 from cmm_uq.jobs.importing.lengths.circles import centre_of, circles_of
+from cmm_uq.jobs.importing.lengths.other_kinds import other_kind
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, placed, placed_runs
 from cmm_uq.jobs.importing.roles import at_places, said
 from cmm_uq.jobs.importing.tabular import alternatives
@@ -103,7 +104,7 @@ def _imported(
     if len(content) > TABLE_BYTES.most:
         large = f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file"
         raise CmmUqError(large, where=where, fix="Split it")
-    form, file = formats.format_of(content, where), PurePath(where).name
+    form, file, sheets = formats.format_of(content, where), PurePath(where).name, list[Sheet]()
     recognised = Recognition(file, form.name, form.title, (), {}, 0)
     problem: NotReadError | None = None
     try:
@@ -128,6 +129,7 @@ def _imported(
         understood = understand(_alternatives(form, content, where, keys), keys.columns, where, points=not keys.lines)
         if understood is not None:
             return _understood(understood, keys, where, reach_mm, recognised)
+        problem = other_kind(sheets, where) or problem if not keys.columns else problem
     raise problem or heads.no_header(sheets, keys, where, wanted)
 
 

@@ -37,6 +37,7 @@ from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
 from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, said_elsewhere, stated_places, words_beside
 from cmm_uq.jobs.importing.lengths.run_columns import runs_in
 from cmm_uq.jobs.importing.lengths.turned import turned
+from cmm_uq.jobs.importing.lengths.turning_table import table_spheres
 from cmm_uq.jobs.importing.lines import AxisRun, MeasuredLengths
 from cmm_uq.jobs.importing.numbering import numbered_points
 from cmm_uq.jobs.importing.roles import SheetReading, each, joined, like, said_by
@@ -234,10 +235,8 @@ def _of_sheet(grid: CutSheet, across: bool) -> list[Found]:
             readings = [o for o in readings if not (o.beside_lengths and (any(called) or (o.planned and called)))]
             reading = max(readings, key=lambda one: len({*one.rows, *one.others}))
             reading.lines = [sheet.lines[row] for row in reading.rows]
-            reading.passed = [
-                *reading.passed,
-                *(text for row in angles for text in grid.block_of[row].titles[row].values()),
-            ]
+            titles = (text for row in angles for text in grid.block_of[row].titles[row].values())
+            reading.passed = [*reading.passed, *titles]
             found.append((reading, grid))
     if problem is not None and not found:
         raise problem
@@ -387,7 +386,8 @@ class Understanding:
             unit, of_unit = self.unit(keys, where, reach_mm)
             xyz = np.column_stack([formats.converted(own, unit, "x_mm") for own in np.array(self.reading.figures).T])
             labels = self.reading.every_label
-            numbers, facts = numbered_points(labels, xyz, keys, where)
+            spheres = table_spheres(labels, xyz, self.sheets, self.grid.sign, where)
+            numbers, facts = (spheres, []) if spheres else numbered_points(labels, xyz, keys, where)
         except NotReadError as error:
             if not self.reading.bare:
                 raise

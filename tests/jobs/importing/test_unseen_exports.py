@@ -100,7 +100,6 @@ REFUSED = {
     "V29": "each a recording of its own",
     "W19": "each a recording of its own",
     "Z12": "may be measured places and others",
-    "Z17": "no column is z_mm",
     "Z19": "a table that turned",
 }
 """Of exports that are not read, what is said."""

@@ -21,7 +21,7 @@ from cmm_uq.jobs.importing.lengths.places import said_in
 from cmm_uq.jobs.importing.lines import AxisRun
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in
 
-_DEGREES = re.compile(r"°|度|\b(?:deg|gra[dus]|stop|stup)|각도", re.IGNORECASE)
+DEGREES = re.compile(r"°|度|\b(?:deg|gra[dus]|stop|stup)|각도", re.IGNORECASE)
 _MOST_OF_A_TURN, _TURN = 300.0, 360.0
 _ARC = re.compile(r"(-?\d+(?:\.\d+)?)\s*°?\s*(?:/|\.{2,3}|–|→|\b[^\W\d]{1,3}\b)\s*(-?\d+(?:\.\d+)?)")
 _PLANE = re.compile(r"(?<![A-Za-z])(XY|YZ|ZX|XZ|YX|ZY|G17|G18|G19)(?![A-Za-z])")
@@ -37,7 +37,7 @@ def circles_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
     """Radial deviations by angle of rows below one head; ``None`` where no column goes round a circle."""
     columns = columns_in(grid, blocks, rows)
     round_ = (
-        c for c in columns if _DEGREES.search(c.heading) and np.nanmax(c.values) - np.nanmin(c.values) > _MOST_OF_A_TURN
+        c for c in columns if DEGREES.search(c.heading) and np.nanmax(c.values) - np.nanmin(c.values) > _MOST_OF_A_TURN
     )
     angle = next((c for c in round_ if np.isfinite(c.values).mean() > _NEARLY), None)
     if angle is None or len(rows) < _FEWEST:
@@ -95,8 +95,13 @@ def _inside(angles: Floats, flags: Sequence[FigureColumn], texts: Sequence[str],
 
 def says(text: str, table: str) -> bool:
     """Whether a text has words of a table of circles."""
-    plain = f" {' '.join(plain_words(text))} "
-    return any(f" {one} " in plain or (unspaced(one) and one in plain) for one in words_of("circles")[table])
+    return in_words(" ".join(plain_words(text)), "circles", table)
+
+
+def in_words(plain: str, *tables: str) -> bool:
+    """Whether words are among those of a table: of a script without blanks as parts."""
+    known = words_of(tables[0])[tables[1]]
+    return any(f" {one} " in f" {plain} " or (unspaced(one) and one in plain) for one in known)
 
 
 def sense_of(texts: Iterable[str]) -> int:

@@ -6,7 +6,7 @@ ranges and extremes follow from others, and limits from the reference.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise, permutations
 
@@ -171,3 +171,8 @@ def passes_over_axes(reading: SheetReading, paths: Sequence[Sequence[str]]) -> b
     named = [(i, {*" ".join(path).upper().split()} & {*"XYZ"}) for i, path in enumerate(paths)]
     every = {axis for _, own in named for axis in own}
     return len(every) == len("XYZ") and any(own for i, own in named if i not in used)
+
+
+def spread(columns: Iterable[Sequence[FigureColumn]], wide: float) -> bool:
+    """Whether coordinates are of a plate, and of no ring that stays where it is."""
+    return all(c.full and c.step < 1 and np.ptp(c.values) > wide for own in columns for c in own)
