@@ -37,6 +37,12 @@ def test_a_ring_that_stays_where_it_is_is_no_plate() -> None:
         read(["No.;Centre X (mm);Centre Y (mm)", *rows])
 
 
+def test_lengths_along_two_axes_are_no_plate() -> None:
+    rows = [f"{n};{50 * n + n % 2 / 1e3:.4f};{70 * n + n % 3 / 1e3:.4f}" for n in range(1, 7)]
+    with pytest.raises(CmmUqError):
+        read(["No.;X axis [mm];Y axis [mm]", *rows])
+
+
 @pytest.mark.parametrize(
     "heads",
     [("Калібровані координати, мм", "Відхилення, прохід {}, мкм"), ("Calibrated [mm]", "Deviation, pass {} [um]"),

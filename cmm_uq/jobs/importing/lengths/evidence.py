@@ -174,5 +174,7 @@ def passes_over_axes(reading: SheetReading, paths: Sequence[Sequence[str]]) -> b
 
 
 def spread(columns: Iterable[Sequence[FigureColumn]], wide: float) -> bool:
-    """Whether coordinates are of a plate, and of no ring that stays where it is."""
-    return all(c.full and c.step < 1 and np.ptp(c.values) > wide for own in columns for c in own)
+    """Whether coordinates are of a plate: of no ring that stays where it is, nor lengths along two axes that grow together."""
+    every = [c for own in columns for c in own]
+    steps = [np.abs(np.diff(c.values)) > wide for c in every]
+    return all(c.full and c.step < 1 and np.ptp(c.values) > wide for c in every) and not np.all(steps, axis=0).all()
