@@ -189,7 +189,9 @@ def test_a_command_that_does_not_compute_loads_nothing_heavy(command: str, iota:
     program = (
         "import sys; sys.argv = ['cmm-uq', *sys.argv[1:]]\n"
         "import cmm_uq.app.cli.commands as c\nc.run()\n"
+        "import cmm_uq.laboratory.records.place, cmm_uq.laboratory.records.facts\n"
         "heavy = ['matplotlib', 'scipy.stats', 'emcee', 'pandas', 'scipy.optimize._optimize', 'jinja2', 'typst']\n"
+        "heavy += ['sqlalchemy', 'alembic']\n"
         "print([name for name in heavy if name in sys.modules])"
     )
     asked = [str(iota), "-q"] if command == "check" else ["step_gauge", str(tmp_path / "new"), "-q"]

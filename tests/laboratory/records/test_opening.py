@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -227,15 +226,6 @@ def test_a_file_that_another_process_is_making_is_waited_for(tmp_path: Path) -> 
     threading.Timer(0.4, other.execute, ("ROLLBACK",)).start()
     with open_records(place, create=True) as records:
         assert records.append("sent", {"turn": 1}).number == 1
-
-
-def test_checking_a_job_does_not_import_the_database(iota: Path) -> None:
-    code = (
-        "import sys; from cmm_uq.app.api.calls import check; from pathlib import Path; "
-        f"check(Path({str(iota)!r})); import cmm_uq.laboratory.records.place, cmm_uq.laboratory.records.facts; "
-        "sys.exit(any(name.split('.')[0] in ('sqlalchemy', 'alembic') for name in sys.modules))"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def first(path: Path) -> Path:
