@@ -188,7 +188,10 @@ def no_regions(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @contextmanager
 def without_diagnosis() -> Iterator[None]:
-    """As if nothing were missing in the model: the search for it is more than half of a report."""
+    """As if nothing were missing in the model: the search for it is more than half of a report.
+
+    Nothing that is kept for tests elsewhere is to be made meanwhile.
+    """
     alike = np.zeros(1)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("cmm_uq.analysis.diagnosis.comparison.search.lack_of_fit", lambda *_: (1.0, alike, alike))
