@@ -30,6 +30,7 @@ def main() -> None:
     watch()
     for variable in THREADS:
         os.environ.setdefault(variable, "1")
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")  # it would read what every installed package offers
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # what matters is an error or a warning of the report, not a line of a library
     lighten()

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -20,10 +22,8 @@ from cmm_uq.artefacts import names, table_of
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output.manifest import refuse_taken, write_new
 from cmm_uq.base.plugins import EFFECTS, KINDS, STANDARDS, Plugin, naming_package, offered
-from cmm_uq.jobs.derived_job import Truth
 from cmm_uq.jobs.schema import DRAFT, Schema, chosen_by, job_schema, schema_of
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect, Parameter
 from cmm_uq.machine.physics.stated import physics_of
@@ -57,23 +57,18 @@ def budget() -> Schema:
     }  # fmt: skip
 
 
-def part() -> Schema:
-    from cmm_uq.jobs.part.tables import PartFile
-
-    return schema_of(PartFile, "job.toml of a part, for cmm-uq")
-
-
-def schedule() -> Schema:
-    from cmm_uq.laboratory.schedule.settings import ScheduleFile
-
-    return schema_of(ScheduleFile, "schedule.toml of cmm-uq")
+def _of_table(place: str, title: str) -> Schema:
+    module, _, table = place.partition(":")
+    return schema_of(getattr(import_module(f"cmm_uq.{module}"), table), title)
 
 
 SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
-    "job": job, "part": part, "budget": budget, "truth": lambda: schema_of(Truth, "truth.toml of cmm-uq"),
-    "instrument": lambda: schema_of(ProfileFile, "instrument profile of cmm-uq"),
-    "schedule": schedule,
+    "job": job, "part": partial(_of_table, "jobs.part.tables:PartFile", "job.toml of a part, for cmm-uq"),
+    "budget": budget, "truth": partial(_of_table, "jobs.derived_job:Truth", "truth.toml of cmm-uq"),
+    "instrument": partial(_of_table, "laboratory.live.instruments.profile:ProfileFile", "instrument profile of cmm-uq"),
+    "schedule": partial(_of_table, "laboratory.schedule.settings:ScheduleFile", "schedule.toml of cmm-uq"),
 })  # fmt: skip
+"""By name; the module of a file's table is imported when its schema is asked for."""
 
 
 @naming_package()

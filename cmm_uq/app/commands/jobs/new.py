@@ -29,7 +29,6 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.columns import REQUIRED
 from cmm_uq.jobs.derived_job import PROGRAM, Truth
-from cmm_uq.jobs.importing.cells.stated import Offer, offers
 from cmm_uq.jobs.importing.format import FileKeys
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import PART as PART
@@ -42,6 +41,7 @@ from cmm_uq.machine.physics.stated import physics_of
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.parts.new import Answers
+    from cmm_uq.jobs.importing.cells.stated import Offer
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
 REST = "docs/reference/job.md, cmm-uq schema job, or what an editor that knows TOML schemas completes"
@@ -243,6 +243,8 @@ def _seen(effect: Effect, kind: Kind, job: Job) -> bool:
 
 def _day_in(recording: Mapping[str, Any], files: Mapping[str, bytes]) -> Offer | None:
     """When an export says that it was measured."""
+    from cmm_uq.jobs.importing.cells.stated import offers
+
     name, keys = str(recording.get("file", "")), {k: v for k, v in recording.items() if k in FileKeys.model_fields}
     if name not in files:
         return None
