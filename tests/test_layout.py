@@ -27,10 +27,10 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 3_540, "maths": 11_051, "jobs": 19_387, "machine": 7_807, "analysis": 21_752, "laboratory": 14_612,
-    "certificate": 16_699, "artefacts": 13_914, "app": 18_785,
+    "certificate": 16_699, "artefacts": 13_914, "app": 18_782,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
-OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 221, 1458
+OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 220, 1458
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
     "arviz", "asn1crypto", "asyncio", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
