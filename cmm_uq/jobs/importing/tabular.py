@@ -15,6 +15,7 @@ import re
 import warnings
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from typing import Any
@@ -37,6 +38,7 @@ _TITLES: dict[str, Text] = {
     ",": say("comma"), ";": say("semicolon"), "\t": say("tab"), "|": say("bar"), _BLANK: say("blanks"),
 }  # fmt: skip
 _LINES = re.compile(r"\s*[\r\n]\s*")  # of a heading in a cell
+_NEARLY = 0.6  # of lines with figures
 _KNOWN = 2  # headings that are understood, by which another separator than single blanks is taken
 _NUMBER = re.compile(rb'\br="(\d+)"')
 _HIDDEN_ROW = re.compile(rb'<row\b(?=[^>]*\bhidden="(?:1|true)")[^>]*>')
@@ -98,11 +100,20 @@ def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> Row
 def alternatives(content: bytes, where: str, keys: ImportKeys) -> Iterator[list[Sheet]]:
     """A text cut into cells by each separator that it has, in turn."""
     text, encoding = decoded(content, where, keys.encoding)
+    figured = [line for line in text.splitlines()[:LINES_BEFORE] if any(map(str.isdigit, line))]
     for candidate in _TITLES if keys.delimiter is None else (DELIMITERS[keys.delimiter],):
-        if candidate in text:
+        # a sign that stands as often in nearly all lines parts their cells, and blanks are of texts
+        regular = any(_regular(figured, sign) for sign in ("\t", ";", "|")) if candidate == _BLANK else False
+        if candidate in text and (not regular or keys.delimiter is not None):
             yield [Sheet("", *_rows(text, candidate, where), facts=_facts(encoding, candidate))]
     if (rows := in_pairs(text)) is not None and keys.delimiter is None:
         yield [Sheet("", *_filled(rows, f"{where} line"), facts=_facts(encoding, _BLANK)[:1])]
+
+
+def _regular(lines: Sequence[str], sign: str) -> bool:
+    counts = Counter(line.count(sign) for line in lines)
+    most, number = counts.most_common(1)[0] if counts else (0, 0)
+    return most > 1 and number >= _NEARLY * len(lines)
 
 
 def _facts(encoding: str, delimiter: str) -> tuple[Fact, ...]:
