@@ -374,13 +374,13 @@ class CutSheet:
         return head
 
     def _titles_above(self, row: int, filled: Sequence[int], head: Sequence[int], numbers: Sequence[int]) -> bool:
-        """Whether a row that fills the first cells alone is of titles, above heads that name each column already."""
+        """Whether a row is of titles (``Axis: Y``, or in the first cells alone) above heads that name each column."""
         paths = self._paths(head)
-        packed = filled == [*range(len(filled))] and 1 < len(filled) < sum(any(path) for path in paths)
-        if not packed or len({heading(paths[k]) for k in numbers} - {""}) < len(numbers):
-            return False
-        each = (self.text(row, k) for k in filled)
-        return not all(self._says_role(text) or unit_of([text]) or hint(text, lengths=True) for text in each)
+        each = [self.text(row, k) for k in filled]
+        named = len(filled) > 1 and len({heading(paths[k]) for k in numbers} - {""}) == len(numbers)
+        packed = filled == [*range(len(filled))] and len(filled) < sum(map(any, paths))
+        known = all(self._says_role(text) or unit_of([text]) or hint(text, lengths=True) for text in each)
+        return named and ((packed and not known) or all(":" in text[:-1] for text in each))
 
     def _paths(self, head: Sequence[int]) -> list[list[str]]:
         """Texts above each column; a text of an upper row stands over the columns up to the next one of it or above it."""

@@ -250,3 +250,23 @@ def test_numbers_in_attributes_of_xml_count_what_their_elements_are() -> None:
         imported(f"<?xml version='1.0'?>\n<Report>{body}</Report>".encode(), "x.xml", ImportKeys(unit="mm"))
     found = error.value.lengths[0]
     assert ({*found.names}, {*found.repeat}) == ({"1", "2", "3"}, {1, 2})
+
+
+def test_results_by_words_that_nobody_knows_below_runs() -> None:
+    rows = [
+        f"{i + 1};{t};" + ";".join(f"{run[i]:.1f}".replace(".", ",") for run in RUNS) for i, t in enumerate(TARGETS)
+    ]
+    head = "i;Sollposition;1 auf;1 ab;2 auf;2 ab"
+    text = "\n".join(
+        ["Achse: Y;;;Einheit: µm", head, ";mm;;;;", *rows, "Blubgenauigkeit A;;5,2", "Zorkspanne;;0,9", ""]
+    )
+    found = runs(text, "Y")
+    assert sorted(found.columns["reading_um"].tolist()) == sorted(v for run in RUNS for v in run)
+    assert "Blubgenauigkeit" in told(found, "left_out")
+
+
+def test_tabs_in_every_line_part_its_cells_and_blanks_do_not() -> None:
+    rows = [f"{n:.5f}\t0.15\t{n + e:.5f}\t{e:.5f}\t{line}\t{run}" for line in "XYZ" for n in (20.00013, 60.00021, 100.00008)
+            for run, e in ((1, 0.00037 + n / 1e5), (2, 0.00073 - n / 1e6))]  # fmt: skip
+    found = lengths("\n".join(["L cal [mm]\tU cal [µm]\tL ind [mm]\tE [mm]\tDirection\tSeries", *rows, ""]), "x.txt")
+    assert ({*found.names}, {*found.repeat}) == ({*"XYZ"}, {1, 2})

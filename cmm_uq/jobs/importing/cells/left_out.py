@@ -162,7 +162,8 @@ def _of_results(grid: CutSheet, row: int, rows: Collection[int]) -> bool:
     full = [k for k in range(grid.width) if all(grid.figure(own, k) for own in rows)]
     fine = [k for k in full if any((f := grid.figure(own, k)) and f[1] < 1 for own in rows)]
     numbers = [k for k in full if k < min(fine, default=0)]
-    if any(WORD.search(grid.text(row, k)) and not grid.figure(row, k) for k in fine):
+    worded = [k for k in full if WORD.search(grid.text(row, k)) and not grid.figure(row, k)]
+    if any(k in fine for k in worded) or (worded and not all(grid.figure(row, k) for k in fine)):
         return True
     return WORD.search(grid.line(row)) is not None and any(not grid.text(row, k) for k in numbers)
 
