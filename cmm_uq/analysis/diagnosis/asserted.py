@@ -29,9 +29,10 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import (
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation, Member, effect_of
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, rivals_of
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, ODDS, other_forms
+from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, ODDS, FormCheck, checked_forms
 from cmm_uq.analysis.diagnosis.joint import NAMED, JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
@@ -217,24 +218,26 @@ class OmittedEffect:
     alternatives: tuple[AlternativeSet, ...] = ()  # sets that the readings alone do not tell from it
 
 
-def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel) -> tuple[OmittedEffect, ...]:
+def left_out(
+    result: SearchResult, joint: JointPosterior, before: RecordingModel, forms: FormCheck
+) -> tuple[OmittedEffect, ...]:
     index = {str.__str__(result.first.explanations[i].name): i for i in result.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
     linear, first = result.model.estimate().linear, _squares(before.estimate().linear, ())
     total = first - _squares(linear, ())
-    listed, sets, combinations = [], tuple[AlternativeSet, ...](), result.combinations
+    listed, sets, combinations, alone = [], tuple[AlternativeSet, ...](), result.combinations, _by_readings(result)
     if combinations is not None and result.chosen:
         sets = alternative_sets(result.first.comparison, combinations, result.chosen, result.versions)
     rigid = {str(result.first.explanations[i].name) for i in effects_of_every_machine(result.first.comparison)}
     for effect in (e for e in result.model.effects if e.name in result.effects):
         modes = period_modes(result, index[effect.name])
         known = not modes or jointly.period_settled(result, index[effect.name], modes)
-        probability, together, group = probability_of(result, index[effect.name], known=known)
+        probability, together, group = probability_of(result, index[effect.name], forms.acting, known=known)
         stand_ins = tuple(one for one in sets if effect.name in one.instead_of)
         # that it is one effect and not two is no evidence: by the readings alone
         fewer = [1 / s.odds for s in stand_ins if len(s.effects) != len(s.instead_of) or {*s.effects} <= rigid]
-        by_readings = min(probability, together / (1 + sum(fewer))) if fewer else probability
+        by_readings = min(probability, together / (1 + sum(fewer)), alone.get(index[effect.name], 1.0))
         group = group if probability < NAMED else ()
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
@@ -258,8 +261,15 @@ def left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel
     return tuple(sorted(listed, key=lambda item: -item.probability))
 
 
-def probability_of(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
-    """Of an effect by itself, and with all that could stand in its place; and the names of those."""
+def probability_of(
+    result: SearchResult, index: int, acting: Mapping[int, float] | None = None, *, known: bool
+) -> tuple[float, float, tuple[Text, ...]]:
+    """Of an effect by itself, and with all that could stand in its place; and the names of those.
+
+    ``acting``: of effects that they act and no function does (:class:`FormCheck`); one by default. What a smooth function
+    takes that could pass for a scale or a squareness is the straight line's as far as that is more probable than any
+    function. No evidence is better than what as many recordings with nothing missing show by chance.
+    """
     combinations = result.combinations
     if combinations is None:
         return 0.0, 0.0, ()
@@ -267,7 +277,20 @@ def probability_of(result: SearchResult, index: int, *, known: bool) -> tuple[fl
     group = _as_well(result, index, group_of(combinations, result.chosen, index))
     ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
     names = tuple(combinations.explanations[i].name for i in ordered)
-    return combinations.of(index), combinations.of_any(group | {index}), names
+    own, together = combinations.of(index), combinations.of_any(group | {index})
+    acts, some = (acting or {}).get(index, 1.0), _better_than_chance(result.first.p_value)
+    if effect_of(result.first.explanations[index]).everywhere:
+        alike = combinations.imitating(index)
+        own += acts * (combinations.of_any(alike | {index}) - own)
+        together += acts * (combinations.of_any(alike | group | {index}) - together)
+        acts = 1.0
+    return acts * some * own, acts * some * together, names
+
+
+def _better_than_chance(p_value: float) -> float:
+    """Largest probability that something is missing, by a p-value (Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62)."""
+    least = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else float(p_value > 0)
+    return float(1 / (1 + least * NOTHING / (1 - NOTHING)))
 
 
 def _as_well(result: SearchResult, index: int, others: Iterable[int]) -> Key:
@@ -304,18 +327,24 @@ def indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
     return tuple(groups)
 
 
-def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], bool]:
-    """Effects that are not to be named; where there are none, whether a function is shown beside those that are."""
-    gone = dict[int, WithheldEffect]()
+def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], FormCheck]:
+    """Effects that are not to be named, and how probable all are in their forms."""
+    gone, none = dict[int, WithheldEffect](), FormCheck({}, {}, beside=False)
     for i in result.chosen if result.combinations is not None else ():
         if probability_of(result, i, known=_known(result, i))[1] < NAMED:
             gone[i] = withheld_effect(result, i, IMPROBABLE)
     data = FunctionFit.of(result, result.first.families) if result.chosen and not gone else None
     if data is None or not data.families or not data.degrees:
-        return gone, False
-    others, beside = other_forms(result, data, [i for i in sorted(result.chosen) if _known(result, i)])
-    why = {i: say("the readings show another form: {function}", function=other.title) for i, other in others.items()}
-    return {i: withheld_effect(result, i, one) for i, one in why.items()}, beside
+        return gone, none
+    found = checked_forms(result, data, [i for i in sorted(result.chosen) if _known(result, i)])
+    why = {
+        i: say("the readings show another form: {function}", function=other.title) for i, other in found.other.items()
+    }
+    gone = {i: withheld_effect(result, i, one) for i, one in why.items()}
+    if not gone:
+        less = (i for i in result.chosen if probability_of(result, i, found.acting, known=_known(result, i))[1] < NAMED)
+        gone = {i: withheld_effect(result, i, IMPROBABLE) for i in less}
+    return gone, found
 
 
 def least_supported(result: SearchResult) -> dict[int, WithheldEffect]:
@@ -323,14 +352,20 @@ def least_supported(result: SearchResult) -> dict[int, WithheldEffect]:
 
     Those of a machine out of adjustment make each other probable, and none of them is ever exactly zero: that is no evidence.
     """
+    alone = _by_readings(result)
+    if not alone or alone[weakest := min(alone, key=lambda i: alone[i])] >= ODDS / (1 + ODDS):
+        return {}
+    return {weakest: replace(withheld_effect(result, weakest, UNSUPPORTED), probability=alone[weakest])}
+
+
+def _by_readings(result: SearchResult) -> dict[int, float]:
+    """Probability of each scale and squareness by the readings alone, all else kept."""
     comparison, own = result.first.comparison, dict[int, float]()
     for i in (i for i in sorted(result.chosen) if result.first.explanations[i].together):
         given = [v for v in result.versions if v.explanation != i]
-        own[i] = comparison.beside(given, (i,))[i][0] - float(comparison.log_evidence_of(given)[0])
-    if not own or own[weakest := min(own, key=lambda i: own[i])] >= np.log(ODDS):
-        return {}
-    alone = float(scipy.special.expit(own[weakest]))
-    return {weakest: replace(withheld_effect(result, weakest, UNSUPPORTED), probability=alone)}
+        odds = comparison.beside(given, (i,))[i][0] - float(comparison.log_evidence_of(given)[0])
+        own[i] = float(scipy.special.expit(odds))
+    return own
 
 
 def _known(result: SearchResult, index: int) -> bool:

@@ -16,7 +16,13 @@ from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, doubted, indisting
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
-from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalModel, best_known, empirical_model
+from cmm_uq.analysis.diagnosis.empirical.model import (
+    BestKnown,
+    EmpiricalModel,
+    FormCheck,
+    best_known,
+    empirical_model,
+)
 from cmm_uq.analysis.diagnosis.held_out import Improvement, RepeatComparison, against_repeats, improvement, thin_out
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, WithheldEffect, joint_posterior
 from cmm_uq.analysis.diagnosis.location import Place, locate
@@ -222,7 +228,9 @@ def diagnose(
     least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
     model = replace(model, least_noise=least) if least > model.least_noise else model
     some = model if observe is None else thin_out(model, observe, seed)
-    found, joint, withheld, also = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
+    found, joint, withheld, forms = _asserted(
+        search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known
+    )
     gain = improvement(model, found.model)
     if found.effects and (gain.elpd_gain <= gain.elpd_gain_se or gain.worse):
         withheld = (*withheld, *jointly.withhold_unpredicted(found, gain.unseen))
@@ -234,7 +242,7 @@ def diagnose(
     rivals = tuple((first.explanations[i].name, float(first.probability[i])) for i in most)
     repeats, wrong = against_repeats(found.model), first.p_value < alpha
     shared = repeats is not None and repeats.p_value < alpha
-    doubtful = found.unexplained > _UNKNOWN or shared or also
+    doubtful = found.unexplained > _UNKNOWN or shared or forms.beside
     empirical = empirical_model(found) if wrong and (doubtful or not found.effects) else None
     modelled = empirical is not None and empirical.predicts
     verdict = "undetermined" if shared else "consistent"
@@ -242,7 +250,7 @@ def diagnose(
         named, unnamed = "partial" if doubtful else "explained", "empirical" if modelled else "unexplained"
         verdict = named if found.effects else unnamed
     return Diagnosis(
-        verdict, first.p_value, alpha, locate(first, alpha, found.chosen), left_out(found, joint, model),
+        verdict, first.p_value, alpha, locate(first, alpha, found.chosen), left_out(found, joint, model, forms),
         indistinguishable(found), rivals, noise, gain, model, after, joint.components, joint.posterior,
         int(some.used.sum()), found, withheld, average_models(found, joint, model, seed), empirical, repeats,
         best_known(found) if wrong else None,
@@ -251,8 +259,8 @@ def diagnose(
 
 def _asserted(
     result: SearchResult, model: RecordingModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
-) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...], bool]:
-    """What of a search may be asserted, and whether a function is shown beside it.
+) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...], FormCheck]:
+    """What of a search may be asserted, and how probable its forms are.
 
     Where an effect's size is open its next probable is tried, else the least goes.
     """
@@ -263,15 +271,15 @@ def _asserted(
         while weak := least_supported(result):  # within the noise: nothing more is unexplained without it
             result = replace(withhold(result, frozenset(weak)), unexplained=result.unexplained)
             gone = (*gone, *weak.values())
-        doubtful, beside = doubted(result)
+        doubtful, forms = doubted(result)
         while doubtful:
             tried |= frozenset(doubtful)  # none of them takes the place of another
             result, gone = withhold(result, frozenset(doubtful)), (*gone, *doubtful.values())
-            doubtful, beside = doubted(result)
+            doubtful, forms = doubted(result)
         result = _of_all(result, model)
         joint = joint_posterior(result, seed, progress, known)
         if not (more := jointly.effects_without_size(result, joint)):
-            return result, joint, gone, beside
+            return result, joint, gone, forms
         tried |= frozenset(more)
         alone = []
         for i, withheld in more.items():

@@ -48,22 +48,24 @@ def test_an_effect_is_named_from_four_in_five_with_what_could_stand_in_its_place
         patched.setattr("cmm_uq.analysis.diagnosis.asserted._as_well", lambda _found, _one, others: frozenset(others))
         patched.setattr("cmm_uq.analysis.diagnosis.asserted.FunctionFit.of", lambda *_: None)
         patched.setattr("cmm_uq.analysis.diagnosis.joint.effect_of", lambda _one: effects(("play_x_y",))[0])
-        gone, beside = doubted(start)
-    assert (set(gone), beside) == (set() if named else {0}, False)
+        patched.setattr("cmm_uq.analysis.diagnosis.asserted.effect_of", lambda _one: effects(("play_x_y",))[0])
+        gone, forms = doubted(start)
+    assert (set(gone), forms.beside) == (set() if named else {0}, False)
 
 
 def test_play_that_is_one_is_named() -> None:
     found = search(model(recording(growing=False)), 1.5e-3, alpha=0.01, seed=0)
     assert found.effects == ("play_x_y",)
-    assert doubted(found) == ({}, False)
+    gone, forms = doubted(found)
+    assert (gone, forms.beside) == ({}, False)
 
 
 def test_play_that_grows_across_is_told_as_a_function_of_the_sense_of_motion_and_not_as_play() -> None:
     """A good part of what shows is no play: a product of the sense and of Y stands beside it."""
     found = search(model(recording(growing=True)), 1.5e-3, alpha=0.01, seed=0)
     assert "play_x_y" in found.effects
-    gone, beside = doubted(found)
-    assert beside
+    gone, forms = doubted(found)
+    assert forms.beside
     (one,) = (each for each in gone.values() if each.effect == "play_x_y")
     assert "function of direction of travel along X and Y" in str(one.why)
 

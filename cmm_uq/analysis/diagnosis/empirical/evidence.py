@@ -21,7 +21,8 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.base.values import dataclass, replace
 
-_SMALLEST = 0.4  # smallest rms of a function that is considered, over the noise
+# Rms of a function that is considered: the smallest over the noise, and the largest over that of all that is to be explained
+_SMALLEST, _LARGER = 0.4, 3.0
 _FOLLOWED, IMPROBABLE = 40, 1e-3  # versions that a prediction averages, and what a version adds to it at least
 # Part of the largest log evidence over nothing from which on a form may come first between its nodes, and how many of these
 _WORTH_DIVIDING, _NODES = 0.5, 6
@@ -179,6 +180,11 @@ class FunctionFit:
         explained = np.sum(sizes[:, :, None] ** 2 / (1 + ratio) * along[:, None], axis=2)
         log = self.integral(self.square - explained) - 0.5 * np.log1p(ratio).sum(axis=2)
         log[rms * largest < _SMALLEST] = -np.inf  # even the largest would not show
+        # what shows would be larger than all that is there: two waves that all but cancel at the places read
+        sigma = np.maximum(
+            np.sqrt(np.maximum(self.square - explained, 0.0)), self.least * np.sqrt(max(self.degrees, 1))
+        )
+        log[(sizes > sizes[:, -1:]) & (sizes * sigma * rms[:, None] > _LARGER * np.sqrt(self.square))] = -np.inf
         return log + np.reshape(log_prior, (-1, 1)) - np.log(AMPLITUDES), sizes
 
     def refined(self) -> FunctionFit:

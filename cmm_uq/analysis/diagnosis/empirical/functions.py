@@ -27,6 +27,7 @@ PRODUCT, BOWL, SINE = "product", "bowl", "sine"  # forms, the first two of two r
 _STEPS, _HINGES, _PLACES, _SATURATES, _PHASES = 40, 19, 24, 15, 12
 _WIDTHS, _SOFT, _REACHES, _DEAD = (0.03, 0.06, 0.12), (0.04, 0.08, 0.16), (0.05, 0.1, 0.2, 0.4), 6
 _CENTRES = (-0.4, -0.2, 0.0, 0.2, 0.4)  # of a dead zone, in halves of the range
+_SAME = 1e-3  # part of the range within which readings are of one place
 # Frequencies, in periods over the range: less than one is a curve, and a sawtooth of less than two a step
 _WHOLE, _SEVERAL, _BETWEEN, _SINES, _TEETH = 1.0, 2.0, 0.35, 25.0, 12.0
 Function = Callable[[Floats, Floats], Floats]
@@ -51,7 +52,7 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
     """Every form of a covariate (n,): of a time one that settles or grows is called exponential, of a reading saturating."""
     low, span, distinct = float(covariate.min()), float(np.ptp(covariate)), np.unique(covariate)
     high, middle, half, gaps = low + span, low + 0.5 * span, 0.5 * span, np.diff(distinct)
-    between = distinct[:-1] + 0.5 * gaps
+    between, places = distinct[:-1] + 0.5 * gaps, 1 + int(np.sum(gaps > _SAME * span))
     if len(between) > _STEPS:
         parts = np.array_split(np.arange(len(gaps)), _STEPS)
         widest = np.array([part[np.argmax(gaps[part])] for part in parts])
@@ -70,11 +71,11 @@ def forms_of(covariate: Floats, *, time: bool = False) -> Iterator[ClosedForm]:
     formula = f"1 - exp(-(c - {low!r})/reach)"
     yield _even(settles, ("reach",), reach, lambda c, s: 1 - np.exp(-(c - low) / s[:, 0]), formula)
     yield _even(settles, ("reach",), reach, lambda c, s: np.exp((c - high) / s[:, 0]), f"exp((c - {high!r})/reach)")
-    period = span / np.arange(_WHOLE, min(_SINES, 0.5 * len(distinct)), _BETWEEN)
+    period = span / np.arange(_WHOLE, min(_SINES, 0.5 * places), _BETWEEN)
     for orders in ((1,), (1, 2)) if len(period) > 1 else ():
         waves = [f"{wave}({2 * order}*pi*c/period)" for order in orders for wave in ("cos", "sin")]
         yield _even(SINE, ("period",), period, partial(_waves, orders), ";".join(waves))
-    period = span / np.arange(_SEVERAL, min(_TEETH, 0.25 * len(distinct)), _BETWEEN)
+    period = span / np.arange(_SEVERAL, min(_TEETH, 0.25 * places), _BETWEEN)
     if len(period) > 1:
         grid, apart = _grid(period, np.arange(_PHASES) / _PHASES)
         grid[:, 1], apart[:, 1] = grid[:, 1] * grid[:, 0], apart[:, 1] * grid[:, 0]
@@ -124,6 +125,7 @@ _ROUGH, _GRID, _KEPT = (0.4, 0.15, 0.05), 100, 3e-3
 _TURNED = 0.3  # how readily a curve of rotation is thought of, beside a displacement
 _SEEN = 1e-9  # mm, length of columns for a size that physics allows
 _PARTS = (np.arange(9) - 4) / 9  # of the distance of two nodes
+_HARMONICS, _FALLS = 6, 0.7  # of what repeats itself in any shape, and how large each is, over the one before
 
 
 @dataclass(frozen=True)
@@ -201,6 +203,22 @@ def _of_form(term: FunctionTerm, form: ClosedForm, seen: Seen, covariate: Floats
     values = UNKNOWN_SD * form.values(covariate, form.shapes)
     columns = seen(values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
     return FunctionFamily(term, form.name, columns, log_prior, covariate, values, form, seen, form.formula)
+
+
+def waves(like: FunctionFamily, periods: Floats) -> Families:
+    """What repeats itself and is no sine of such periods (K,): uneven, of a size and phase that wander, or of any shape.
+
+    Together they are as probable as ``like`` says of one.
+    """
+    c, seen = like.covariate, like.seen or (lambda f: f)
+    turn, half = 2 * np.pi * c[:, None] / periods, like.log_prior - float(np.log(2))
+    orders = [np.stack([np.cos(k * turn), np.sin(k * turn)], axis=2) for k in range(1, _HARMONICS + 1)]
+    smooth = list(candidate.smooth_functions(c))
+    wander = [(orders[0][..., None] * f[:, None, None]).reshape(*turn.shape, -1) for f in smooth]
+    repeated = UNKNOWN_SD * np.concatenate([_FALLS**k * one for k, one in enumerate(orders)], axis=2)
+    for f, many in (*((one, len(smooth)) for one in wander), (repeated, 1)):
+        columns = seen(f.reshape(len(c), -1)).reshape(-1, *f.shape[1:])
+        yield replace(like, columns=columns, values=f, log_prior=half - float(np.log(many)), shaped=None)
 
 
 def _without_curve(term: FunctionTerm, form: str, columns: Floats, log_prior: float, formula: str) -> FunctionFamily:

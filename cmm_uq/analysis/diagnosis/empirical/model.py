@@ -16,12 +16,26 @@ from itertools import combinations as subsets
 import numpy as np
 import scipy
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, effect_of
+from cmm_uq.analysis.diagnosis.comparison.explanations import (
+    EFFECT,
+    UNKNOWN,
+    UNKNOWN_SD,
+    Explanation,
+    effect_of,
+)
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical import evidence
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.functions import PRODUCT, ROUGH, SINE, SMOOTH, FunctionFamily, FunctionTerm
+from cmm_uq.analysis.diagnosis.empirical.functions import (
+    PRODUCT,
+    ROUGH,
+    SINE,
+    SMOOTH,
+    FunctionFamily,
+    FunctionTerm,
+    waves,
+)
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import without_unseen
 from cmm_uq.base.messages import Text
@@ -136,6 +150,7 @@ def _described(data: FunctionFit, result: SearchResult) -> EmpiricalFunction:
     form, stated = None, ""
     if name not in (SMOOTH, ROUGH) and (most >= _CLEAR or not len(x)):
         most = most * _of_functions(data, result) if most >= _CLEAR else most
+        most = most * _of_sines(data, chosen) if name == SINE and most >= _CLEAR else most
         form, stated = _named(data, own, name, most)
         form = form if most >= _CLEAR else None
     elif len(x) and term.along is not None:
@@ -153,6 +168,17 @@ def _of_functions(data: FunctionFit, result: SearchResult) -> float:
     every = enumerate(result.first.explanations)
     effects = [of_effect(result, i, data) for i, e in every if e.kind == EFFECT and i not in result.chosen]
     return float(scipy.special.expit(data.total - np.logaddexp.reduce(np.ravel(effects), initial=-np.inf)))
+
+
+def _of_sines(data: FunctionFit, of: Sequence[int]) -> float:
+    """Probability that what a term repeats is a sine, of one harmonic or two, and no other wave."""
+    sines = [i for i in of if data.families[i].form == SINE]
+    own = float(np.logaddexp.reduce([np.logaddexp.reduce(data.evidence[i][0], axis=None) for i in sines]))
+    like, other = next(data.families[i] for i in of if data.families[i].seen), -np.inf
+    for shaped, log in ((f.shaped, f.log_prior) for f in (data.families[i] for i in sines)):
+        every = waves(replace(like, log_prior=log), shaped.shapes[:, 0]) if shaped is not None else ()
+        other = np.logaddexp.reduce([other, *(np.logaddexp.reduce(data.of_family(f)[0], axis=None) for f in every)])
+    return float(scipy.special.expit(own - other))
 
 
 def of_effect(result: SearchResult, index: int, data: FunctionFit) -> tuple[float, float]:
@@ -224,10 +250,13 @@ def _named(data: FunctionFit, own: Sequence[int], name: str, probability: float)
     each = [data.fitted(version)[:2] for version, _ in versions]
     sizes = np.array([mean for mean, _ in each]) * UNKNOWN_SD / MICROMETRE  # (v, r)
     spread = np.array([np.diag(covariance) for _, covariance in each]) * (UNKNOWN_SD / MICROMETRE) ** 2
-    mean = weight @ sizes
-    variance = weight @ (spread + (sizes - mean) ** 2)
-    size, along = float(np.linalg.norm(mean)), mean / max(float(np.linalg.norm(mean)), 1e-300)
-    parameters = {"size_um": _quantity(float(mean[0]) if len(mean) == 1 else size, float(along**2 @ variance), "µm")}
+    # of several coefficients the length: they turn as the period does, and their mean says nothing
+    length = np.linalg.norm(sizes, axis=1)
+    along = sizes / np.where(length > 0, length, 1.0)[:, None]
+    each_size = sizes[:, 0] if sizes.shape[1] == 1 else length
+    size = float(weight @ each_size)
+    variance = float(weight @ (np.sum(along**2 * spread, axis=1) + (each_size - size) ** 2))
+    parameters = {"size_um": _quantity(size, variance, "µm")}
     family = data.families[own[0]]
     nodes = [(data.families[version.family].shaped, version.index) for version, _ in versions]
     shapes, apart = (np.array([getattr(f, of)[k] if f else [] for f, k in nodes]) for of in ("shapes", "apart"))
@@ -238,7 +267,9 @@ def _named(data: FunctionFit, own: Sequence[int], name: str, probability: float)
         variance_of = weight @ ((shapes[:, k] - values[k]) ** 2 + apart[:, k] ** 2 / 12)
         parameters[parameter] = _quantity(float(values[k]), float(variance_of), of)
         text = re.sub(rf"\b{parameter}\b", f"{values[k]:.7g}", text)
-    stated = "" if family.term.along is None else _stated(family.term, text.split(";"), np.abs(mean).tolist())
+    stated = (
+        "" if family.term.along is None else _stated(family.term, text.split(";"), np.sqrt(weight @ sizes**2).tolist())
+    )
     return NamedForm(name, probability, parameters), stated
 
 
@@ -290,37 +321,72 @@ def best_known(result: SearchResult) -> BestKnown | None:
     return BestKnown(effect.name, effect.title, probability, odds, gain, effect.points_to)
 
 
-def other_forms(result: SearchResult, data: FunctionFit, of: Sequence[int]) -> tuple[dict[int, FunctionTerm], bool]:
-    """Of effects that have another form what the readings show in their place; whether a function is shown beside all."""
+@dataclass(frozen=True, eq=False)
+class FormCheck:
+    """How probable effects are in their forms among all that an error could be."""
+
+    other: dict[int, FunctionTerm]  # of effects that have another form what the readings show in their place
+    # of each the probability that it acts, in whatever form of its own, and not a function
+    acting: dict[int, float]
+    beside: bool  # whether a function is shown beside all
+
+
+def checked_forms(result: SearchResult, data: FunctionFit, of: Sequence[int]) -> FormCheck:
     data = replace(data, free=np.hstack([data.free, _straight_lines(result)]))
     beside, finer = list[FunctionTerm](), data.refined()
     while len(beside) < MOST and finer.total - finer.nothing > np.log(ODDS):
         beside.append(_likeliest(finer))
         data = replace(finer.with_function(finer.versions(1)[0]), families=data.families)
         finer = data.refined()
-    found = {i: other for i in of if (other := _other_form(result, data, i, beside)) is not None}
-    if not found:
-        found = {k: term for two in subsets(of, 2) for term in _one_of_both(result, data, *two) for k in two}
-    return found, bool(beside)
+    each = {i: _own_form(result, data, i, beside) for i in of}
+    other = {i: term for i, (_, term) in each.items() if term is not None}
+    if not other:
+        other = {k: term for two in subsets(of, 2) for term in _one_of_both(result, data, *two) for k in two}
+    return FormCheck(other, {i: p for i, (p, _) in each.items()}, bool(beside))
 
 
-def _other_form(result: SearchResult, data: FunctionFit, i: int, beside: Sequence[FunctionTerm]) -> FunctionTerm | None:
-    """What the readings show in the place of an effect, or of what it is a function, beside it."""
+def _own_form(
+    result: SearchResult, data: FunctionFit, i: int, beside: Sequence[FunctionTerm]
+) -> tuple[float, FunctionTerm | None]:
+    """Probability of an effect over all functions, and what the readings show in its place, or of what it is a function."""
     known, without = result.first.explanations[i], _without(result, data, i)
-    if effect_of(known).everywhere:  # a straight line has no other form
-        return None
-    of = {*effect_of(known).columns, *(t.of for t in known.imitated_by)}
-    if other := next((one for one in beside if of & set(one.of.split(","))), None):
-        return other
+    straight, of = effect_of(known).everywhere, {*effect_of(known).columns, *(t.of for t in known.imitated_by)}
+    if not straight and (other := next((one for one in beside if of & set(one.of.split(","))), None)):
+        return 0.0, other
     shown = without.rest(known.members[0].columns / result.first.comparison.noise_scale[:, None])
-    # a product or a wave of which it is a part is no other form: what that has besides would show beside it
-    waves = {(t.of, t.along) for t in known.imitated_by if any(s.period_along for s in effect_of(known).shape)}
-    others = [f for f in data.families if f.form != SINE or (f.term.of, f.term.along) not in waves]
+    # a product of which it is a part, or one wave, is no other form: what that has besides would show beside it
+    terms, periodic = {(t.of, t.along) for t in known.imitated_by}, _periodic(known)
+    one_wave = (f for f in data.families if f.form == SINE and f.columns.shape[2] == 2)
+    itself = {id(f) for f in one_wave if periodic and (f.term.of, f.term.along) in terms}
+    others = [f for f in data.families if id(f) not in itself]
     others = [f for f in others if f.form != PRODUCT or not _part(shown, without.rest(f.columns[:, 0]))]
     without = replace(without, families=others).refined()
     own, another = np.array(of_effect(result, i, without)) - np.log(known.weight)  # its rarity was counted before
-    every = np.logaddexp.reduce([own, another, without.total])
-    return _likeliest(without) if own < np.log(_OWN) + every else None
+    functions = np.logaddexp(without.total, _waves(result, without, known, i) if periodic else -np.inf)
+    mechanism, every = np.logaddexp(own, another), np.logaddexp.reduce([own, another, functions])
+    acting = float(np.exp(mechanism - np.logaddexp(mechanism, functions)))
+    # a straight line has no other form
+    return acting, _likeliest(without) if own < np.log(_OWN) + every and not straight else None
+
+
+def _periodic(known: Explanation) -> bool:
+    return any(shape.period_along for shape in effect_of(known).shape)
+
+
+def _waves(result: SearchResult, data: FunctionFit, known: Explanation, index: int) -> float:
+    """Log evidence and prior of waves of an effect's periods that are no sine, together as probable as it."""
+    terms, members = {(t.of, t.along) for t in known.imitated_by}, [m for m in known.members if m.shape]
+    like = next(
+        (f for f in data.families if f.seen and f.term.lever is None and (f.term.of, f.term.along) in terms), None
+    )
+    if like is None:
+        return -np.inf
+    like = replace(like, log_prior=float(log_prior(result.first.explanations)[index] - np.log(SHARES[UNKNOWN])))
+    weight = np.log([m.weight / sum(one.weight for one in known.members) for m in members])[:, None]
+    every = waves(like, np.array([m.shape[0] for m in members]))
+    return float(
+        np.logaddexp.reduce([np.logaddexp.reduce(data.of_family(one)[0] + weight, axis=None) for one in every])
+    )
 
 
 def _one_of_both(result: SearchResult, data: FunctionFit, one: int, other: int) -> Iterator[FunctionTerm]:
