@@ -278,7 +278,10 @@ def probability_of(
     ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
     names = tuple(combinations.explanations[i].name for i in ordered)
     own, together = combinations.of(index), combinations.of_any(group | {index})
-    acts, some = (acting or {}).get(index, 1.0), _better_than_chance(result.first.p_value)
+    acts, some = (
+        (acting or {}).get(index, 1.0),
+        _better_than_chance(max(result.first.p_value, result.first.by_rearrangement)),
+    )
     if effect_of(result.first.explanations[index]).everywhere:
         alike = combinations.imitating(index)
         own += acts * (combinations.of_any(alike | {index}) - own)

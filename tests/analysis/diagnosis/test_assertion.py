@@ -105,7 +105,7 @@ def test_effects_that_a_function_could_not_be_are_not_named_with_it() -> None:
 
 def found_with(*members: tuple[tuple[int, ...], float], chosen: frozenset[int]) -> SearchResult:
     of = combinations(*members)
-    first = SimpleNamespace(explanations=of.explanations, families=[], p_value=0.0)
+    first = SimpleNamespace(explanations=of.explanations, families=[], p_value=0.0, by_rearrangement=0.0)
     none: Any = None
     return SearchResult(cast("ModelComparison", first), none, of, chosen, (), none, 0.0)
 

@@ -144,8 +144,7 @@ TAIL = 0.8
 # Factor from the false-alarm rate within which a probability is found more closely: 200 draws know one of 0.01 to a factor
 # of three, and heavy tails that are reckoned with make it as much smaller
 _NEAR = 10.0
-# Factor below that rate from which on what is left is not rearranged, and how often it is
-_BEYOND_DOUBT, _REARRANGED = 1000.0, 800
+_REARRANGED = 800  # times that what is left is
 _MOST = 1000  # draws that there are then at most
 _CLEAR = 3.0  # standard errors from the false-alarm rate at which a probability is on one side of it
 _STEEPEST = 1.0  # mean excess of log odds whose tail is that of Markov's inequality
@@ -171,22 +170,22 @@ def lack_of_fit(comparison: CandidateComparison, seed: int, alpha: float | None 
     p_value = tail_probability(statistic[1:], float(statistic[0]))
     if alpha is not None and alpha / _NEAR < p_value < alpha * _NEAR:
         p_value = _nearer(comparison, draws, random, alpha)
-    if alpha is not None and alpha / _BEYOND_DOUBT < p_value < alpha:
-        value, draws = float(statistic[0]), statistic_of(comparison, _rearranged(comparison, random, _REARRANGED))[0]
-        p_value = max(p_value, tail_probability(draws, value), float(np.mean(draws >= value)))
     return p_value, statistic[1:], maxima
 
 
-def _rearranged(comparison: CandidateComparison, random: np.random.Generator, draws: int) -> Floats:
-    """What is left (m, draws) with signs and places at random: as much of it is then large as in the recording itself."""
+def by_rearrangement(comparison: CandidateComparison, seed: int) -> float:
+    """The same from what is left itself, signs and places at random: as much of it is then as large as in the recording."""
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(20,)))
     each = zip(comparison.noise_probability(()).tolist(), comparison.kinds, strict=True)
     kind = max(((p, kind) for p, kind in each if kind.name != "tails"), key=lambda one: one[0])[1]
-    sizes = np.abs(kind.white(comparison.left[:, None])[:, 0])
+    sizes = np.sort(np.abs(kind.white(comparison.left[:, None])[:, 0]))
     order, side = order_and_side(comparison.left, comparison.reached)
-    shuffled = np.column_stack([random.permutation(np.sort(sizes)) for _ in range(draws)])
+    shuffled = np.column_stack([random.permutation(sizes) for _ in range(_REARRANGED)])
     white = np.empty_like(shuffled)
     white[order] = shuffled * random.choice([-1.0, 1.0], shuffled.shape)
-    return comparison.rest(kind.coloured(side[:, None] * white))
+    drawn = comparison.rest(kind.coloured(side[:, None] * white))
+    value, *draws = statistic_of(comparison, np.column_stack([comparison.left, drawn]))[0].tolist()
+    return max(tail_probability(np.array(draws), value), float(np.mean(np.array(draws) >= value)))
 
 
 def _nearer(comparison: CandidateComparison, draws: Floats, random: np.random.Generator, alpha: float) -> float:

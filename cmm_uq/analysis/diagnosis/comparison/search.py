@@ -13,7 +13,7 @@ from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key,
 from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, by_rearrangement, lack_of_fit, log_prior
 from cmm_uq.analysis.diagnosis.comparison.lack_of_form import lack_of_form
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily, each_family, families_of
 from cmm_uq.analysis.diagnosis.noise import noise_kinds, sigma_grid
@@ -35,6 +35,7 @@ _FEW = 6  # periods that are refined where none shows
 # Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)
 _BETWEEN = 0.12
 _IMPROBABLE = 12.0  # log evidence below that of the best from which a period is not followed
+_BEYOND_DOUBT = 1000.0  # factor below the false-alarm rate from which on a misfit is beyond doubt
 _AGAIN = 3  # times that everything is compared again about what was found
 # Part of an effect's squared visible length up to which a nonparametric term that leaves no more of it could pass for it
 _PASSES = 0.1
@@ -49,6 +50,7 @@ class ModelComparison:
     log_odds: Floats  # (c,) log evidence of each over nothing
     probability: Floats  # (c,) of each explanation, nothing included in the comparison
     p_value: float
+    by_rearrangement: float  # the same of what is left itself; zero where it is not in doubt
     null: Floats  # (draws,) test statistic under nothing
     null_maximum: Floats  # (draws,) largest log evidence of a nonparametric term over nothing, under nothing
 
@@ -272,7 +274,9 @@ def model_comparison(
     log_total = scipy.special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
     p_value, null, maxima = lack_of_fit(comparison, seed, alpha)
     probability = np.exp(prior + log_odds - log_total)
-    return ModelComparison(model, values, comparison, log_odds, probability, p_value, null, maxima)
+    near = alpha is not None and alpha / _BEYOND_DOUBT < p_value < alpha
+    rearranged = by_rearrangement(comparison, seed) if near else 0.0
+    return ModelComparison(model, values, comparison, log_odds, probability, p_value, rearranged, null, maxima)
 
 
 def comparison_of(

@@ -359,9 +359,13 @@ def _own_form(
     one_wave = (f for f in data.families if f.form == SINE and f.columns.shape[2] == 2)
     itself = {id(f) for f in one_wave if periodic and (f.term.of, f.term.along) in terms}
     others = [f for f in data.families if id(f) not in itself]
-    others = [f for f in others if f.form != PRODUCT or not _part(shown, without.rest(f.columns[:, 0]))]
-    without = replace(without, families=others).refined()
+    alike = [f for f in others if f.form == PRODUCT or f.term.lever not in (None, f.term.along)]
+    alike = [f for f in alike if _part(shown, without.rest(f.columns[:, 0]))]
+    # a curve of rotation of which it is the straight line is another form of it
+    curves = [np.logaddexp.reduce(without.of_family(f)[0], axis=None) for f in alike if f.form != PRODUCT]
+    without = replace(without, families=[f for f in others if not any(f is one for one in alike)]).refined()
     own, another = np.array(of_effect(result, i, without)) - np.log(known.weight)  # its rarity was counted before
+    another = np.logaddexp.reduce([another, *curves])
     functions = np.logaddexp(without.total, _waves(result, without, known, i) if periodic else -np.inf)
     mechanism, every = np.logaddexp(own, another), np.logaddexp.reduce([own, another, functions])
     acting = float(np.exp(mechanism - np.logaddexp(mechanism, functions)))
