@@ -8,7 +8,7 @@ beforehand does not either. Of fifty effects some three imitate any weak one wit
 end it, and it is no reason to doubt what is found.
 
 A name is for a technician who acts on it: nine in ten is asked of an effect, or of it with what the readings do not tell from
-it, and four in five of its form among all that an error could be (:mod:`~cmm_uq.analysis.diagnosis.empirical.model`).
+it, and four in five of its form among all that an error could be (:mod:`~cmm_uq.analysis.diagnosis.empirical.own_form`).
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, U
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, rivals_of
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
-from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, ODDS, FormCheck, checked_forms
+from cmm_uq.analysis.diagnosis.empirical.model import ALIKE, ODDS
+from cmm_uq.analysis.diagnosis.empirical.own_form import FormCheck, checked_forms
 from cmm_uq.analysis.diagnosis.joint import NAMED, JointPosterior, Mode, WithheldEffect, period_modes, withheld_effect
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
@@ -278,11 +279,9 @@ def probability_of(
     ordered = sorted((i for i in group if combinations.of(i) > 0), key=lambda i: -combinations.of(i))
     names = tuple(combinations.explanations[i].name for i in ordered)
     own, together = combinations.of(index), combinations.of_any(group | {index})
-    acts, some = (
-        (acting or {}).get(index, 1.0),
-        _better_than_chance(max(result.first.p_value, result.first.by_rearrangement)),
-    )
-    if effect_of(result.first.explanations[index]).everywhere:
+    acts, first = (acting or {}).get(index, 1.0), result.first
+    some = better_than_chance(max(first.p_value, first.by_rearrangement))
+    if effect_of(first.explanations[index]).everywhere:
         alike = combinations.imitating(index)
         own += acts * (combinations.of_any(alike | {index}) - own)
         together += acts * (combinations.of_any(alike | group | {index}) - together)
@@ -290,7 +289,7 @@ def probability_of(
     return acts * some * own, acts * some * together, names
 
 
-def _better_than_chance(p_value: float) -> float:
+def better_than_chance(p_value: float) -> float:
     """Largest probability that something is missing, by a p-value (Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62)."""
     least = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else float(p_value > 0)
     return float(1 / (1 + least * NOTHING / (1 - NOTHING)))
@@ -340,10 +339,8 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], FormCheck]
     if data is None or not data.families or not data.degrees:
         return gone, none
     found = checked_forms(result, data, [i for i in sorted(result.chosen) if _known(result, i)])
-    why = {
-        i: say("the readings show another form: {function}", function=other.title) for i, other in found.other.items()
-    }
-    gone = {i: withheld_effect(result, i, one) for i, one in why.items()}
+    shown = "the readings show another form: {function}"
+    gone = {i: withheld_effect(result, i, say(shown, function=other.title)) for i, other in found.other.items()}
     if not gone:
         less = (i for i in result.chosen if probability_of(result, i, found.acting, known=_known(result, i))[1] < NAMED)
         gone = {i: withheld_effect(result, i, IMPROBABLE) for i in less}

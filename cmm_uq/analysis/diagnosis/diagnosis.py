@@ -16,13 +16,8 @@ from cmm_uq.analysis.diagnosis.asserted import OmittedEffect, doubted, indisting
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, substitute, with_effects, withhold
-from cmm_uq.analysis.diagnosis.empirical.model import (
-    BestKnown,
-    EmpiricalModel,
-    FormCheck,
-    best_known,
-    empirical_model,
-)
+from cmm_uq.analysis.diagnosis.empirical.model import BestKnown, EmpiricalModel, best_known, empirical_model
+from cmm_uq.analysis.diagnosis.empirical.own_form import FormCheck
 from cmm_uq.analysis.diagnosis.held_out import Improvement, RepeatComparison, against_repeats, improvement, thin_out
 from cmm_uq.analysis.diagnosis.joint import JointPosterior, WithheldEffect, joint_posterior
 from cmm_uq.analysis.diagnosis.location import Place, locate

@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.asserted import doubted, least_supported
+from cmm_uq.analysis.diagnosis.asserted import better_than_chance, doubted, least_supported
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, search, withhold
 from cmm_uq.analysis.diagnosis.diagnosis import diagnose
 from cmm_uq.analysis.diagnosis.empirical.model import empirical_model
@@ -81,6 +82,26 @@ def test_waves_that_grow_shorter_are_no_period(shorter: float, *, named: bool) -
     found = search(model(once.at(once.xyz - error[:, None] * [0, 1, 0] + noise)), 1.5e-3, alpha=0.01, seed=0)
     assert "periodic_scale_y" in found.effects
     assert ("periodic_scale_y" in {one.effect for one in doubted(found)[0].values()}) is not named
+
+
+def test_a_beat_of_two_waves_is_no_period() -> None:
+    random = np.random.default_rng(5)
+    once = bars(random, 100, 400.0, Machine("m", "XYZ", TRAVEL))
+    u = (once.xyz[:, 1] - once.xyz[:, 1].min()) / float(np.ptp(once.xyz[:, 1]))
+    error = 1.2e-3 * (np.sin(2 * np.pi * 3 * u) + np.sin(2 * np.pi * 4.2 * u))
+    noise = 1.5e-3 * random.standard_normal(once.xyz.shape)
+    found = search(model(once.at(once.xyz - error[:, None] * [0, 1, 0] + noise)), 1.5e-3, alpha=0.01, seed=0)
+    assert found.effects == ("periodic_scale_y",)
+    assert not named(found)
+
+
+@pytest.mark.parametrize(
+    ("p_value", "odds"), [(0.1, 0.625), (0.05, 0.407), (0.01, 0.125), (0.005, 0.072), (0.001, 0.0188)]
+)
+def test_nothing_is_more_probable_than_chance_allows(p_value: float, odds: float) -> None:
+    """Odds of nothing at least, of even ones: Sellke, Bayarri & Berger (2001), table 1."""
+    even = NOTHING / (1 - NOTHING)
+    assert 1 / better_than_chance(p_value) - 1 == pytest.approx(odds * even, rel=6e-3)
 
 
 def shifted(random: np.random.Generator, axis: int, error: Callable[[Points], Floats]) -> RecordingModel:

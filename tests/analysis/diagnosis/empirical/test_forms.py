@@ -65,3 +65,10 @@ def test_however_few_values_a_covariate_has_its_forms_are_there(count: int) -> N
     """With nine values a saw had one period, which is next to no other."""
     for form in forms_of(np.arange(float(count))):
         assert len(form.shapes) >= 1
+
+
+def test_places_read_again_with_noise_show_no_shorter_period() -> None:
+    """Seven places 5 mm apart, each ten times to a micrometre: two places a period."""
+    read = np.repeat(5.0 * np.arange(7), 10) + 1e-3 * np.random.default_rng(1).standard_normal(70)
+    periods = [form.shapes[:, 0] for form in forms_of(read) if form.name in ("sine", "sawtooth")]
+    assert min(float(each.min()) for each in periods) > 2 * 30.0 / 7
