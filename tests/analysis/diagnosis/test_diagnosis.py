@@ -284,7 +284,7 @@ def test_they_are_consistent_without_an_outlier(points: Points) -> None:
 
 
 def test_on_seven_lines_of_a_gauge_scales_and_squarenesses_are_another_scale_of_each_line() -> None:
-    """By equations written apart from the package: whatever six errors do, seven temperatures do, and no reading parts them."""
+    """By equations written apart from the package: whatever six errors do, seven temperatures do."""
     true, line, _ = gauge(np.random.default_rng(0))
     six = {name: e for name, e in errors(true).items() if name.startswith(("scale", "squareness"))}
     assert len(six) == 6
