@@ -21,7 +21,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import interruption
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import Records
-from tests.conftest import ROOT, without_diagnosis
+from tests.conftest import ROOT
 from tests.laboratory.records.histories import certificate
 
 BAR_MM, BAR_U_UM = 404.2357, 5.0
@@ -50,8 +50,7 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
         'machine = "DEA Iota 1102"\n', issuer
     )  # which certified the bar on this machine: no traceability
     (job / "job.toml").write_text(toml + LABORATORY, encoding="utf-8")
-    with without_diagnosis():
-        write_report(job, folder / "reports" / "iota", records=folder / "reports" / "records.db", language="fr")
+    write_report(job, folder / "reports" / "iota", records=folder / "reports" / "records.db", language="fr")
     return folder / "reports"
 
 
