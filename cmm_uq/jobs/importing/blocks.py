@@ -17,9 +17,9 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.figures import figure, sign_of, unit_of
-from cmm_uq.jobs.importing.factors import LINE, RUN, begun, counts_pages, hint
+from cmm_uq.jobs.importing.factors import LINE, RUN, begun, counts_pages, hint, says_role
 from cmm_uq.jobs.importing.format import LENGTH, UNITS, NotReadError, Sheet, WrittenUnit, apart, unit_named
-from cmm_uq.jobs.importing.header import COVERAGE, WORD, named_alike, plain_words, without_unit, words_of
+from cmm_uq.jobs.importing.header import COVERAGE, WORD, named_alike, without_unit
 from cmm_uq.jobs.importing.lengths import places
 from cmm_uq.jobs.importing.lengths.place_columns import place_columns
 
@@ -239,18 +239,12 @@ class CutSheet:
     def _without_names(self, head: list[int], block: Block | None) -> list[int]:
         """A head without a row below it that names a feature, as ``Ball 1 | 9 points | outside``, and no column."""
         above = head[:-1] or (block.head if block is not None else [])
-        named = sum(self._says_role(text) for row in above for text in self.sheet.rows[row])
+        named = sum(says_role(text) for row in above for text in self.sheet.rows[row])
         cells = [str(cell) for cell in self.sheet.rows[head[-1]] if cell != ""] if head else []
         first = bool(cells) and self.text(head[-1], 0) == cells[0] and any(map(str.isdigit, cells[0]))
         if named < _ROLES or not first or len(cells) < 2 or not all(WORD.search(cell) for cell in cells):
             return head
-        return head if any(self._says_role(cell) or unit_of([cell]) for cell in cells) else head[:-1]
-
-    @staticmethod
-    def _says_role(cell: formats.Cell) -> bool:
-        words = {*plain_words(str(cell))}
-        of = words_of("lengths")
-        return any(not words.isdisjoint(of[role]) for role in ("measured", "reference", "nominal", "deviation"))
+        return head if any(says_role(cell) or unit_of([cell]) for cell in cells) else head[:-1]
 
     def _titled(self, blocks: list[Block]) -> list[Block]:
         """Blocks, upper rows of whose heads are titles, for they differ where the rows below them are the same."""
@@ -349,11 +343,16 @@ class CutSheet:
             texts = [self.text(row, k) for k in filled]
             odd = any(
                 len(text) > 60
-                or (len(filled) < 4 and "=" in COVERAGE.sub("", text) and not places.says_figures(text))
+                or (
+                    len(filled) < 4
+                    and "=" in COVERAGE.sub("", text)
+                    and not says_role(text)
+                    and not places.says_figures(text)
+                )
                 or len(_PRINTED.findall(_BRACKETS.sub("", text))) > 1
                 for text in texts
             )
-            odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3
+            odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3 or counts_pages(self.line(row))
             over = [k for k in filled if k in numbers]
             said = sum(map(places.says_figures, texts))
             each = (over == filled or not said) and len(over) + 1 >= len(numbers)  # then they stand above columns
@@ -379,7 +378,7 @@ class CutSheet:
         each = [self.text(row, k) for k in filled]
         named = len(filled) > 1 and len({heading(paths[k]) for k in numbers} - {""}) == len(numbers)
         packed = filled == [*range(len(filled))] and len(filled) < sum(map(any, paths))
-        known = all(self._says_role(text) or unit_of([text]) or hint(text, lengths=True) for text in each)
+        known = all(says_role(text) or unit_of([text]) or hint(text, lengths=True) for text in each)
         return named and ((packed and not known) or all(":" in text[:-1] for text in each))
 
     def _paths(self, head: Sequence[int]) -> list[list[str]]:

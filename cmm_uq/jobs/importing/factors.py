@@ -353,3 +353,9 @@ def counts_pages(text: str) -> bool:
 def begun(word: str) -> str:
     """How a title begins; all letters of axes alike."""
     return "x" if len(word) == 1 and word.isascii() else re.sub(r"^[xyz](?=[^\x00-\x7f])", "x", word.casefold())
+
+
+def says_role(cell: object) -> bool:
+    """Whether words call a column measured, a reference, nominal or a deviation."""
+    words, of = {*plain_words(str(cell))}, words_of("lengths")
+    return any(not words.isdisjoint(of[role]) for role in ("measured", "reference", "nominal", "deviation"))

@@ -8,6 +8,7 @@ break ties. Where nothing stands beside them, the order in which distances come 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
@@ -33,6 +34,7 @@ _ANGLE = re.compile(r"°(?!\s?[CF])|度|\bdeg\b")
 # what speaks for a way, the strongest first
 _TURNED, _WORDS, _MOVED, _RESTARTED, _NAMED, _AT_LEAST = 6.0, 5.0, 4.0, 3.0, 2.0, 1.0
 _APART = 3  # times what repeats scatter, which is more than drift
+_MOSTLY = 0.8  # names of one form, where the others are of something else
 _SINGLE = 1.1  # names for each place, at most, of points that are measured in turn
 _FEW, _SEVERAL = 3, 6  # points, which may be anything, and whose order alone says nothing
 
@@ -76,8 +78,18 @@ def _places_of_many(xyz: Floats) -> Ints:
     return joined if often[2:].max(initial=0) > _NEARLY * often.sum() else alone
 
 
+def _odd_among(names: Sequence[str]) -> bool:
+    """Whether each has a name of its own, nearly all of one form but for numbers, two or more, and letters."""
+    letters = (re.sub(r"(?<![^\W_])[A-Za-z](?![^\W\d_])", "a", factors.numberless(name)) for name in names)
+    form, most = Counter(letters).most_common(1)[0]
+    alike = form.count("0") > 1 and len({*names}) == len(names)
+    return alike and _MOSTLY * len(names) < most < len(names)
+
+
 def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[str]] | None:
     """Measurement, point and repeat of each of the places (n, 3), mm; ``None`` where nothing says which belong together."""
+    if any(label.sort == "column" and _odd_among(label.values) for label in labels):
+        return None  # a few names are of something else, as of a drift check
     place = places(xyz)
     found = _named_by_level(every := factors.varying(labels, lengths=False))
     ways = [*filter(None, (_grouped(of, found, place, xyz) for of in _labels(found)))]

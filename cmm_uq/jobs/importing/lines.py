@@ -249,7 +249,7 @@ class _Runs:
             elif section == "DATA" and (words := text.lower().split())[0] == "run":
                 head = [words.index(next(filter(own.__contains__, words), words[-1])) for own in _HEADS]
                 part = "run target data"
-            elif section in ("DEVIATIONS", "DATA") and part.startswith("run target data"):
+            elif section in ("DEVIATIONS", "DATA", "TARGET DATA") and part.startswith("run target data"):
                 cells = text.split()
                 picked = [cells[k] for k in head if k < len(cells)] if head and len(cells) == len(words) else cells
                 figures = self._figures(" ".join(picked), f"{where} line {number}")

@@ -11,7 +11,16 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.cells.encodings import is_number, values_of
-from cmm_uq.jobs.importing.factors import RUN, Label, codes, counted, in_turn, numbered_runs, parts_of, together
+from cmm_uq.jobs.importing.factors import (
+    RUN,
+    Label,
+    codes,
+    counted,
+    in_turn,
+    numbered_runs,
+    parts_of,
+    together,
+)
 from cmm_uq.jobs.importing.format import Cell, Fact, ImportKeys, NotReadError
 from cmm_uq.jobs.importing.grouping import points_told_apart
 

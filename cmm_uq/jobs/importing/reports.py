@@ -208,8 +208,8 @@ def statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:
         if len(begun) > LINE.most:
             raise CmmUqError(f"the statement goes on for more than {LINE.most} characters", where=f"{where} line {start}",
                              fix="Export it again: a line may not end in $ where its statement does")  # fmt: skip
-        if begun.endswith("$"):
-            begun = begun[:-1].rstrip() + " "
+        if begun.endswith("$") and (not begun.endswith("$$") or begun[:-2].rstrip().endswith(",")):
+            begun = begun.rstrip("$").rstrip() + " "
             continue
         yield start, begun
         begun = ""

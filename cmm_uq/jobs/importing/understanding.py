@@ -24,7 +24,7 @@ from cmm_uq.jobs.importing.cells import left_out
 from cmm_uq.jobs.importing.cells.figures import metric, unit_elsewhere, unit_of
 from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settled_unit
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
-from cmm_uq.jobs.importing.factors import codes, counted, hint, states_of
+from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
 from cmm_uq.jobs.importing.grouping import on_a_plate, places
 from cmm_uq.jobs.importing.header import Header, is_summary, shown
@@ -113,9 +113,7 @@ def _reading_of(sheets: Sequence[Sheet], keys: Mapping[str, Sources], where: str
     _label(chosen)
     grid = chosen[0][1]
     whole = joined([reading for reading, _ in chosen])
-    if both := next((label.values for label in whole.every_label if len(states_of({*label.values})) > 1), None):
-        what = f"{', '.join(map(repr, dict.fromkeys(both)))} are of a machine before and after it was adjusted: two recordings"
-        raise NotReadError(what, where=where, fix="Name the columns of one of them, or export one of them")
+    left_out.refuse_mixed(whole, chosen, where)
     take_certified(whole, [*map(CutSheet, upright)])
     return Understanding(whole, sheets, without, grid, chosen, elsewhere, across=grid in across)
 

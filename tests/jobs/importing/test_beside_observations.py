@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
+import openpyxl
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
@@ -270,3 +273,71 @@ def test_tabs_in_every_line_part_its_cells_and_blanks_do_not() -> None:
             for run, e in ((1, 0.00037 + n / 1e5), (2, 0.00073 - n / 1e6))]  # fmt: skip
     found = lengths("\n".join(["L cal [mm]\tU cal [µm]\tL ind [mm]\tE [mm]\tDirection\tSeries", *rows, ""]), "x.txt")
     assert ({*found.names}, {*found.repeat}) == ({*"XYZ"}, {1, 2})
+
+
+def test_figures_that_count_parts_of_a_unit_are_refused() -> None:
+    rows = [
+        f"{t};{int(run_a)};{int(run_b)}" for t, run_a, run_b in zip(TARGETS, (0, 24, 35), (-5, 29, 39), strict=True)
+    ]
+    with pytest.raises(NotReadError, match="parts or multiples of a unit"):
+        imported("\n".join(["Axis X", "Target [mm];+ [0,1 µm];- [0,1 µm]", *rows, ""]).encode(), "x.csv", ImportKeys())
+
+
+def test_lengths_that_a_laser_measures_anew_on_each_sheet_are_of_lines_by_sheet() -> None:
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for p, line in enumerate("XYZ", 1):
+        sheet = book.create_sheet(f"Pos {p}")
+        sheet.append([f"Position {p} : {line}"])
+        sheet.append(["Longueur de référence laser (mm)", "Ecart = MMT - laser (µm)"])
+        sheet.append([None, "n°1", "n°2", "n°3"])
+        for k, n in enumerate((100, 300, 500)):
+            noise = [round(0.37 * (p + 2 * k + 3 * r) % 0.7 - 0.3, 2) for r in range(3)]
+            sheet.append([round(n + 0.013 * (2 * p + k) % 0.03, 4), *noise])
+    out = io.BytesIO()
+    book.save(out)
+    with pytest.raises(UnplacedError) as error:
+        imported(out.getvalue(), "x.xlsx", ImportKeys())
+    found = error.value.lengths[0]
+    assert ({*found.names}, {*found.repeat}) == ({"Pos 1", "Pos 2", "Pos 3"}, {1, 2, 3})
+
+
+def test_a_point_whose_name_is_of_another_form_is_asked_about() -> None:
+    rows = [f"BAR_{m:02d}::{end}_F{face},{100.0 * m + face / 1000:.4f},{400.0 * (end == 'B'):.4f},{-50.0 + m:.4f}"
+            for m in range(1, 9) for end in "AB" for face in (1, 2)]  # fmt: skip
+    head = "Units: mm\nName,X,Y,Z\n"
+    found = imported((head + "\n".join(rows) + "\n").encode(), "x.csv", ImportKeys())
+    assert len({*found.columns["measurement"].tolist()}) == 8
+    text = head + "\n".join([*rows[:16], "Drift::D1,1204.3310,3341.2207,-118.0041", *rows[16:]])
+    with pytest.raises(NotReadError, match="which points belong to one measurement"):
+        imported(f"{text}\n".encode(), "x.csv", ImportKeys())
+
+
+def test_the_head_of_a_page_within_a_table_is_no_head_of_it() -> None:
+    each = [
+        f" KUG({k:2d}) {133.0 * (k % 4) + 0.0002:12.5f} {133.0 * (k // 4):12.5f} {0.0004:10.5f} {22.0003:9.5f}"
+        for k in range(16)
+    ]
+    head = " NAM            X           Y           Z          D"
+    page = " QUINDOS 7              PROTOKOLL           Seite   {}"
+    lines = [
+        page.format(1),
+        " Einheit: MM",
+        "",
+        head,
+        *each[:8],
+        " -----------------------------",
+        page.format(2),
+        "",
+        *each[8:],
+    ]
+    found = imported("\n".join([*lines, ""]).encode(), "x.txt", ImportKeys())
+    assert len(found.lines) == 16
+
+
+def test_a_statement_of_dmis_may_go_on_behind_two_signs() -> None:
+    text = "DMISMN/'P',05.3\nUNITS/MM,ANGDEC\n" + "".join(
+        f"FA(S{k})=FEAT/SPHERE,CART,$$\n   {100.0 * k:.4f},{k / 1000:.4f},0.0002,$$\n 25.4001\n" for k in range(1, 5)
+    )
+    found = imported(text.encode(), "x.dmo", ImportKeys(points_per_measurement="all"))
+    assert found.columns["x_mm"].tolist() == [100.0, 200.0, 300.0, 400.0]

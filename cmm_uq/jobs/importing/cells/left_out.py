@@ -12,12 +12,13 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.jobs.importing import header
 from cmm_uq.jobs.importing.blocks import CutSheet, heading
 from cmm_uq.jobs.importing.columns import LARGEST_MACHINE_MM
-from cmm_uq.jobs.importing.factors import LINE, RUN, hint, says_of
+from cmm_uq.jobs.importing.factors import LINE, RUN, hint, says_of, states_of
 from cmm_uq.jobs.importing.format import UNITS, Cell, NotReadError, Sources, sources_of
 from cmm_uq.jobs.importing.header import WORD, plain_words, words_of
 from cmm_uq.jobs.importing.roles import SheetReading, said
 
 _NUMBERED = 0.6  # of rows
+_TIMES = re.compile(r"(?i)(?<![\w.,])(?:0?[.,]0*1\s?[µumn]?|10+\s?[µun])(?:m|in)(?![^\W_])")  # as 0.1 µm, 10 µm
 _BRACKETS = re.compile(r"\([^)]*\)")
 _SEVERAL = re.compile(r"(?<![^\s])[+-]?\d+[.,]\d+\s+[+-]?\d+[.,]\d+(?!\S)")
 
@@ -211,3 +212,16 @@ def refuse_unmatched(grids: Sequence[CutSheet], keys: Mapping[str, Sources], whe
         if source not in matched:
             headings = [heading(path) for path in grids[0].blocks[-1].paths]
             raise NotReadError(f"no column is {source!r}", where=where, fix=suggestion(source, headings))
+
+
+def refuse_mixed(whole: SheetReading, parts: Sequence[tuple[SheetReading, CutSheet]], where: str) -> None:
+    """A machine before and after it was adjusted is no single recording; figures that count parts of a unit are none."""
+    for own in (label.values for label in whole.every_label):
+        if len(states_of({*own})) > 1:
+            named = ", ".join(map(repr, dict.fromkeys(own)))
+            what = f"{named} are of a machine before and after it was adjusted: two recordings"
+            raise NotReadError(what, where=where, fix="Name the columns of one of them, or export one of them")
+    for text in (text for one, grid in parts for c in one.source for text in grid.path(one.rows[0], c.i)):
+        if _TIMES.search(text):
+            what = f"{text!r} counts parts or multiples of a unit"
+            raise NotReadError(what, where=where, fix="Export it in µm, mm or inch")

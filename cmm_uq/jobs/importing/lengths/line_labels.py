@@ -21,15 +21,16 @@ _FEW = 4  # references that may differ by chance
 
 
 def lengths_of(references: Floats) -> Ints:
-    """A number for each length; of references that were measured anew each time those near each other are of one."""
+    """A number for each length; of references that were measured anew in each row those near each other are of one."""
     own = codes([None if np.isnan(one) else one for one in references])
-    if len(own) < _FEW or own.max() + 1 < len(own):
+    if len(own) < _FEW or np.isnan(references).any():
         return own
     order = np.argsort(references)
     steps = np.diff(references[order]) > np.maximum(0.04, 0.002 * np.abs(references[order][1:]))
     near = np.empty(len(own), dtype=np.int64)
     near[order] = np.concatenate([[0], np.cumsum(steps)])
-    return near
+    again = {*np.bincount(own).tolist()}  # of one row each, with as many runs beside each other
+    return near if len(again) == 1 and 2 * (near.max() + 1) <= own.max() + 1 else own
 
 
 def lines_and_runs(
@@ -38,10 +39,10 @@ def lines_and_runs(
     """Name of the line and number of the run of each length, and by what labels; ``stated``: what may say where it lies."""
     count, several, found = len(reference), bool(reference.max(initial=0) > 0), factors.varying(labels, lengths=True)
     of_lines = {f[0].sort for f in found if f[2] == LINE and not (several and fixes(reference, f[1]))}
-    for k, (label, own, _) in enumerate(found if {"title", "column"} & of_lines else ()):
+    for k, (label, own, _) in enumerate(found if {"title", "column", "sheet"} & of_lines else ()):
         numbered = counting(label.values) and label.values[0][1:2].isdigit()
         numbered |= factors.counts_ways(label.values)
-        numbered |= "title" in of_lines and all(value[-1:].isdigit() for value in label.values)
+        numbered |= bool({"title", "sheet"} & of_lines) and all(value[-1:].isdigit() for value in label.values)
         if label.sort == "head" and numbered:
             found[k] = label, own, RUN  # M1, M2 are measurements of the line that is named, and so are H1, R1, H2, R2
     found = [(f[0], f[1], RUN if _measurements(f, found) else f[2]) for f in found]
