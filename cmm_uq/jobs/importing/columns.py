@@ -79,7 +79,8 @@ def columns_of(
     cells = [table.cells[i] for i in numeric]
     sign = sheet.decimal or decimal_sign(cells, lambda i, row: table.place(numeric[i], row), keys.decimal, most)
     written = {name: table.written(name, sign) for name in plain}
-    _refuse_lengths_along_axes(written, table.start)
+    if "read_x" not in written:  # places along a diagonal are no lengths
+        _refuse_lengths_along_axes(written, table.start)
     _refuse_places_of_lengths(written, table, sign)
     unit, of_unit = table.lengths_unit(keys, written, reach_mm)
     values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}

@@ -341,3 +341,11 @@ def test_a_statement_of_dmis_may_go_on_behind_two_signs() -> None:
     )
     found = imported(text.encode(), "x.dmo", ImportKeys(points_per_measurement="all"))
     assert found.columns["x_mm"].tolist() == [100.0, 200.0, 300.0, 400.0]
+
+
+def test_runs_along_the_diagonal_of_a_cube_are_placed() -> None:
+    rows = [f"{k // 2 + 1};{'+-'[k % 2]};{t};{v}" for k, run in enumerate(RUNS)
+            for t, v in list(zip(TARGETS, run, strict=True))[:: 1 - 2 * (k % 2)]]  # fmt: skip
+    text = "\n".join(["Axis X", "Run;Direction;Target mm;Deviation um", *rows, ""])
+    found = imported(text.encode(), "x.csv", ImportKeys(lines={"X": "from 0,0,0 to 500,500,500"}))
+    np.testing.assert_allclose(found.columns["z_mm"][:3], np.array(TARGETS) / 3**0.5, atol=1e-6)
