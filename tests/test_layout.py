@@ -27,7 +27,7 @@ MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.pr
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
     "": 140, "base": 3_540, "maths": 11_051, "jobs": 19_439, "machine": 7_807, "analysis": 21_911, "laboratory": 14_612,
-    "certificate": 16_699, "artefacts": 13_914, "app": 18_782,
+    "certificate": 16_680, "artefacts": 13_914, "app": 18_782,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 220, 1458

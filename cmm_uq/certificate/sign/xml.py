@@ -11,9 +11,11 @@ import binascii
 import datetime as dt
 import hashlib
 import re
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cmm_uq.base.errors import CmmUqError
@@ -144,31 +146,10 @@ PARTIAL = say("the signature covers a part of the file, or more than the file: o
 NO_CERTIFICATE = say("the signature has no certificate that can be read")
 NO_EVIDENCE = say("what was added to the signature about certificates cannot be read")
 SEVERAL = say("the file has several signatures, and one covers the other")
-_BASE64 = r"[A-Za-z0-9+/=\s]*"
-_FORMS: Mapping[str, tuple[str, str, str]] = {
-    SIGNATURE: ("SignedInfo SignatureValue KeyInfo Object", "Id", r"\s*"),
-    f"{DS}SignatureValue": ("", "Id", _BASE64),
-    f"{DS}KeyInfo": ("X509Data", "Id", r"\s*"),
-    f"{DS}X509Data": ("X509Certificate( X509Certificate)*", "", r"\s*"),
-    f"{DS}X509Certificate": ("", "", _BASE64),
-    f"{DS}Object": ("QualifyingProperties", "", r"\s*"),
-    f"{XADES}QualifyingProperties": ("SignedProperties( UnsignedProperties)?", "Target Id", r"\s*"),
-    f"{XADES}UnsignedProperties": ("UnsignedSignatureProperties", "Id", r"\s*"),
-    f"{XADES}UnsignedSignatureProperties": (
-        "SignatureTimeStamp( CertificateValues)?( RevocationValues)?",
-        "Id",
-        r"\s*",
-    ),
-    f"{XADES}SignatureTimeStamp": ("(CanonicalizationMethod )?EncapsulatedTimeStamp", "Id", r"\s*"),
-    f"{DS}CanonicalizationMethod": ("", "Algorithm", r"\s*"),
-    f"{XADES}EncapsulatedTimeStamp": ("", "Id", _BASE64),
-    f"{XADES}CertificateValues": ("EncapsulatedX509Certificate( EncapsulatedX509Certificate)*", "Id", r"\s*"),
-    f"{XADES}EncapsulatedX509Certificate": ("", "Id", _BASE64),
-    f"{XADES}RevocationValues": ("CRLValues|OCSPValues|CRLValues OCSPValues", "Id", r"\s*"),
-    f"{XADES}CRLValues": ("EncapsulatedCRLValue( EncapsulatedCRLValue)*", "Id", r"\s*"),
-    f"{XADES}OCSPValues": ("EncapsulatedOCSPValue( EncapsulatedOCSPValue)*", "Id", r"\s*"),
-    f"{XADES}EncapsulatedCRLValue": ("", "Id", _BASE64),
-    f"{XADES}EncapsulatedOCSPValue": ("", "Id", _BASE64),
+_FORMS = {
+    f"{{{space}}}{name}": form
+    for space, forms in tomllib.loads(Path(__file__).with_name("forms.toml").read_text(encoding="utf-8")).items()
+    for name, form in forms.items()
 }
 """Of what no signature covers, each element's children, attributes and text (XML Signature 1.1, 4; EN 319 132-1, 5)."""
 
