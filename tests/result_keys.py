@@ -143,6 +143,7 @@ RESULTS: Mapping[str, str] = {
     "conformity[].largest_um": "Of what is decided the largest by its size, noise included; where the next is stated.",
     "conformity[].largest_without_noise_um": "Quantity: the same of the machine alone, without noise; the median.",
     "conformity[].limit_um": "Its limit.",
+    "conformity[].limit_arcsec": "Its limit, where an angle is decided.",
     "conformity[].u_um": "Its standard uncertainty.",
     "conformity[].rule": "Decision rule.",
     "conformity[].guard_band_um": "Guard band.",
