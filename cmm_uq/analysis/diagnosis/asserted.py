@@ -291,7 +291,7 @@ def probability_of(
 
 def better_than_chance(p_value: float) -> float:
     """Largest probability that something is missing, by a p-value (Sellke, Bayarri & Berger 2001, Am. Stat. 55, 62)."""
-    least = -np.e * p_value * np.log(p_value) if 0 < p_value < 1 / np.e else float(p_value > 0)
+    least = -np.exp(1) * p_value * np.log(p_value) if 0 < p_value < np.exp(-1) else float(p_value > 0)
     return float(1 / (1 + least * NOTHING / (1 - NOTHING)))
 
 
@@ -339,8 +339,8 @@ def doubted(result: SearchResult) -> tuple[dict[int, WithheldEffect], FormCheck]
     if data is None or not data.families or not data.degrees:
         return gone, none
     found = checked_forms(result, data, [i for i in sorted(result.chosen) if _known(result, i)])
-    shown = "the readings show another form: {function}"
-    gone = {i: withheld_effect(result, i, say(shown, function=other.title)) for i, other in found.other.items()}
+    shown = {i: say("the readings show another form: {function}", function=own.title) for i, own in found.other.items()}
+    gone = {i: withheld_effect(result, i, why) for i, why in shown.items()}
     if not gone:
         less = (i for i in result.chosen if probability_of(result, i, found.acting, known=_known(result, i))[1] < NAMED)
         gone = {i: withheld_effect(result, i, IMPROBABLE) for i in less}
