@@ -304,7 +304,7 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
 def _deny_summaries(columns: Sequence[FigureColumn]) -> None:
     """Columns that are alike row by row and all called a summary, as by a word that is also one for a diameter, are none."""
     fine = [c for c in columns if not c.minute and not c.counts and np.nanmedian(np.abs(c.values)) > 1]
-    for c in fine:
+    for c in (one for one in fine if one.role == "summary"):
         alike = [o for o in fine if like(c.values, o.values)]
         if len(alike) > 1 and all(o.role == "summary" for o in alike):
             for o in alike:

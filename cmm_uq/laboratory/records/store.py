@@ -104,6 +104,13 @@ class Records(RecordQueries):
 
         return in_blocks(block, first)
 
+    def entry(self, number: int) -> Entry:
+        """The entry of a number; an error where entries were deleted from the database."""
+        if (own := next(self.entries(number), None)) is None or own.number != number:
+            fix = "Restore them from a copy; cmm-uq records verify says what is missing"
+            raise CmmUqError(f"has no entry {number} any more", where=self.shown, fix=fix)
+        return own
+
     def append(self, kind: str, content: Mapping[str, Any], *, at: dt.datetime | None = None) -> Entry:
         """Add an entry; refused where no entry before it allows what it says."""
         return self.append_all([(kind, content, at)])[-1]
@@ -170,7 +177,7 @@ class Records(RecordQueries):
         """Entries of a certificate and its signatures by the SHA-256 of each file that they name, the first of each."""
         if (number := self.has_results(results_sha256)) is None:
             return {}
-        own = next(self.entries(number))
+        own = self.entry(number)
         each = reversed([(own, own.data.get("files") or {}), *self._signed(number)])
         return {digest: entry for entry, files in each for digest in files.values()} | {results_sha256: own}
 

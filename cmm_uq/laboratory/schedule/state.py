@@ -113,7 +113,7 @@ class RecordsState(FolderState):
                 return here
         if (newest := self._newest(job)) is None:
             return None
-        data = next(self.records.entries(newest.entry)).data  # its files were taken away
+        data = self.records.entry(newest.entry).data  # its files were taken away
         decided = [] if newest.decision == NONE else [{"standard": "its certificate", "decision": newest.decision}]
         machine = (data.get("machine") or {}).get("name")
         of = {"id": job, "machine": machine, "inputs_sha256": data.get("inputs") or None}

@@ -321,3 +321,11 @@ def test_entries_have_a_kind_of_the_list_and_their_moment_in_utc(tmp_path: Path)
     assert isinstance(entry, Entry)
     assert entry.at == "2026-03-01T23:30:00.000000Z"
     assert moment(DAY).hour == 15
+
+
+def test_an_entry_that_was_deleted_is_named(whole: Path, tmp_path: Path) -> None:
+    path = spoiled(whole, tmp_path, lambda raw: raw.execute("DELETE FROM entries WHERE number = 3"))
+    with open_records(path, read_only=True) as records:
+        assert records.entry(2).number == 2
+        with pytest.raises(CmmUqError, match="has no entry 3 any more"):
+            records.entry(3)

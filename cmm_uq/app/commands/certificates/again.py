@@ -229,7 +229,7 @@ def _inputs(records: Records, certificate: RecordedCertificate) -> tuple[dict[st
         files = inputs_of(Path(certificate.folder))
     except CmmUqError as error:
         return {}, str(error)
-    recorded = next(records.entries(certificate.entry)).data.get("inputs")
+    recorded = records.entry(certificate.entry).data.get("inputs")
     if recorded != {name: sha256(content).hexdigest() for name, content in files.items()}:
         return {}, f"{certificate.folder}: holds the report of other inputs by now"
     if JOB not in files:

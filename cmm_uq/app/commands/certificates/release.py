@@ -80,7 +80,7 @@ def results_of(records: Records, certificate: RecordedCertificate) -> bytes:
     file = Path(certificate.folder) / RESULTS
     if file.is_file() and sha256_of(file) == certificate.results_sha256:
         return content_of(file, TABLE_BYTES, "")
-    entry = next(records.entries(certificate.entry)).data
+    entry = records.entry(certificate.entry).data
     keys = ("job", "number", "decision", "verdicts", "values", "results_sha256")
     kept = {key: entry[key] for key in keys if key in entry}
     return (json.dumps({"schema": _ENTRY, **kept}, indent=2, ensure_ascii=False, sort_keys=True) + "\n").encode()
@@ -291,7 +291,7 @@ def release(
     certificate, person = certificate_named(records, name, ("draft",)), _person(by)
     if (why := blocked(certificate)) is not None:
         raise CmmUqError(f"{certificate.number} cannot be released: {why}", where=records.shown)
-    content = next(records.entries(certificate.entry)).data
+    content = records.entry(certificate.entry).data
     if missing := content.get("missing"):
         raise CmmUqError(f"{certificate.number} says DRAFT on every page: it does not state {', '.join(missing)}",
                          where=records.shown, fix="State it in job.toml and report again")  # fmt: skip
