@@ -8,6 +8,7 @@ import numpy as np
 import openpyxl
 import pytest
 
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.format import ImportKeys, NotReadError
 from cmm_uq.jobs.importing.lines import MeasuredLengths
 from cmm_uq.jobs.importing.recording import ImportedTable, UnplacedError, imported
@@ -165,6 +166,19 @@ def test_distances_of_a_dmis_output_are_lengths() -> None:
     found = lengths("DMISMN/'E0',05.3\nUNITS/MM,ANGDEC\n" + "".join(halves), "x.dmo")
     assert ({*found.names}, found.repeat[:3]) == ({"POSITION 1", "POSITION 2"}, [1, 2, 3])
     assert found.measured[1] == pytest.approx(100.0018, abs=1e-9)
+
+
+def test_names_of_lengths_are_not_taken_for_lines() -> None:
+    """Each of them has one length alone, along X and along Y, so that a line would have no other."""
+    body = [
+        f"T(D{axis}{n:.0f}_{r})=TOL/DISTB,NOMINL,{n},-0.002,0.002,{axis}AXIS\n"
+        f"TA(D{axis}{n:.0f}_{r})=TOL/DISTB,{n + ERRORS[k % 3][r - 1] / 1000:.5f},INTOL,{axis}AXIS\n"
+        for axis in "XY"
+        for r in (1, 2, 3)
+        for k, n in enumerate((60.0, 180.0, 300.0, 420.0))
+    ]
+    with pytest.raises(CmmUqError, match="'DX60' may name a length, and not a line"):
+        lengths("DMISMN/'E0',05.3\nUNITS/MM,ANGDEC\n" + "".join(body), "x.dmo")
 
 
 def test_places_measured_again_are_read_before_a_sheet_of_their_distances() -> None:

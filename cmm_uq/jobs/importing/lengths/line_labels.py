@@ -72,6 +72,7 @@ def lines_and_runs(
     # else one length on each line, which are named and not counted
     line = line or [f for f in found if f[2] == LINE and not (several and _digits(f[0]))][:1]
     _refuse_unnamed(found, line)
+    _refuse_lengths(reference, line, place)
     key = factors.together(reference, *(f[1] for f in line))
     each = key if run is None else factors.together(key, run[1])
     if each.max() + 1 < count if run is not None else len({*Counter(key.tolist()).values()}) > 1:
@@ -131,6 +132,14 @@ def _refuse_unnamed(found: Sequence[Counted], line: Sequence[Counted]) -> None:
         if shared and of is None and counting(label.values) and pages.isdisjoint(plain_words(label.values[0])):
             fix = 'Say so with a word for a line ahead of each number, as in "Line 1"'
             raise NotReadError(f"titles such as {label.values[0]!r} may name lines", fix=fix)
+
+
+def _refuse_lengths(reference: Ints, line: Sequence[Counted], place: str) -> None:
+    """Names of which each is of one length, while lengths are several, may be those of the lengths."""
+    named = any(f[0].sort in ("part", "block") or f[2] is None for f in line)
+    if named and reference.max() + 1 >= _FEW and fixes(factors.together(*(f[1] for f in line)), reference):
+        fix = 'Write it as a table with a column "line" that names the line of each length'
+        raise NotReadError(f"{line[0][0].values[0]!r} may name a length, and not a line", where=place, fix=fix)
 
 
 def _told_apart(
