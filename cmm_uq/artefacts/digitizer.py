@@ -251,8 +251,7 @@ SCREENING = Screening(shape_of)
 ANGLES = ("alpha_deg", "beta_deg", "gamma_deg")
 SCAN = ("u_mm", "v_mm")
 
-# standard uncertainty of a component of the offset, in those of one centre, from which on attitudes determine
-# nothing
+# standard uncertainty of a component of the offset, in those of one centre, from which on attitudes determine nothing
 MOST = 100.0
 
 _SAME = 1e-9  # degrees by which the rows of one measurement may differ

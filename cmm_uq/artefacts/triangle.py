@@ -140,8 +140,6 @@ SEVEN_PLACINGS = (
     Placing(say("vertical in ZX, longer tip"), "ZX", (0.5, 0.5, 0.0), long_tip=True),
 )
 
-SHIFTED = Placing(say("horizontal, low, shifted along X"), "XY", (1.0, 0.5, 0.0))  # the eighth
-
 
 def placed_triangle(
     machine: Machine, sides: Floats, placings: Sequence[Placing] = SEVEN_PLACINGS, *,

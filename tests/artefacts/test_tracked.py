@@ -15,16 +15,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cmm_uq.analysis.diagnosis.comparison.explanations import means_of_columns
 from cmm_uq.app.commands.jobs.new import job_of_export, new_job
 from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.parts.part import write_part
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.app.commands.report import REPORT, evaluate_job, report_outcome
+from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.optical import tracked
 from cmm_uq.artefacts.optical.tracked import TrackedPoints, predicted_poses
 from cmm_uq.base.arm import THETA, Arm
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Machine, Points
 from cmm_uq.certificate.result import Outcome, Result
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.stated import physics_of
@@ -48,6 +51,30 @@ def robot(effects: tuple[str, ...] = (), **toml: str) -> Job:
         assert old in text
         text = text.replace(old, new)
     return job_of({**FILES, "job.toml": text.encode()})
+
+
+def test_errors_go_by_where_a_pose_was_commanded_and_not_by_the_noise_that_it_was_seen_with() -> None:
+    """Five poses thirty times, seen with 30 µm: a function of places with that noise explains the noise itself."""
+    files = new_job("robot_poses", {}, id="poses")
+    model = recorded_model(job_of(files))[0]
+    about, points = model.estimate().about, model.artefact.points
+    seen, where = model.placed(about), model.where(about)
+    for read, own, place in zip(points.xyz.T, seen.T, where.T, strict=True):
+        for commanded in np.unique(read):
+            rows = read == commanded
+            assert np.std(own[rows]) > 0.02
+            assert_allclose(place[rows], own[rows].mean(), rtol=0, atol=1e-12)
+    assert {"reference_x_mm", "reference_y_mm", "reference_z_mm"}.isdisjoint(means_of_columns(model))
+
+
+def test_places_of_a_scan_stand_each_for_itself() -> None:
+    """Each within 0.1 mm of the next, over 50 mm: they are no place that was read again."""
+    x = np.linspace(0.0, 50.0, 1001)
+    xyz = np.column_stack([x, np.sqrt(2500.0 - x**2) + 1000.0, 10.0 * np.sin(x)])
+    one, columns = np.ones(len(x), dtype=np.int64), {f"reference_{a}_mm": xyz[:, i] for i, a in enumerate("xyz")}
+    points = Points(xyz, one, np.arange(1, len(x) + 1), one, Machine("m"), columns)
+    artefact = TrackedPoints(artefact_facts(kind="tracked_points"), points)
+    assert_allclose(artefact.without_noise(xyz)[:, 0], x, rtol=0, atol=0)
 
 
 def recording(change: dict[str, float | None]) -> bytes:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtri, stdtrit
 
+from cmm_uq.analysis.diagnosis.comparison.explanations import SAME_PLACE
 from cmm_uq.analysis.diagnosis.held_out import numbered_by_place, predicted_folds
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening
 from cmm_uq.artefacts.kinds import TrackedFacts
@@ -37,6 +38,7 @@ from cmm_uq.machine.physics.effects.joints import OfJoint
 from cmm_uq.maths.inference.posterior import Cause
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
+_AGAIN, _WIDEST = 3, 1.0  # points at one reading, fewer of which are chance; mm, beyond which readings are a scan's
 # times the extent of all points by which places may be off before a row is held for damaged: rows may be nominal ones
 _ROBOT = 2.0
 
@@ -45,6 +47,7 @@ class TrackedPoints(Plate):
     """3n observations (x, y, z in turn) of n points, with ``reference_x_mm``, … in the frame of the reference instrument."""
 
     kind = "tracked_points"
+    observed = REFERENCES
     title = say("Reference instrument")
     size_title = size_what = say("Longest distance by the reference instrument")
     plural = "the points as the machine has them"
@@ -67,6 +70,16 @@ class TrackedPoints(Plate):
         moved = np.einsum("nji,nj->ni", self.attitudes(xyz), points.xyz - xyz) / self.expansion[:, None]
         seen = dict(zip(REFERENCES, (self.reference + moved).T, strict=True))
         return replace(points, columns={**points.columns, **seen})
+
+    def without_noise(self, placed: Floats) -> Floats:
+        """The mean along each axis of all that the machine had at one reading: the instrument saw each with its noise."""
+        found = placed.copy()
+        for read, mean in zip(self.points.xyz.T, found.T, strict=True):
+            order = np.argsort(read)
+            for rows in np.split(order, np.flatnonzero(np.diff(read[order]) > SAME_PLACE) + 1):
+                if len(rows) >= _AGAIN and np.ptp(read[rows]) < _WIDEST:
+                    mean[rows] = mean[rows].mean()
+        return found
 
     def figures(self, counts: NDArray[np.bool_]) -> Mapping[str, ArtefactFigure]:
         """RP, RP_a … of each pose that was commanded again; AP, AP_a … where places are seen in the frame of the base."""
@@ -142,17 +155,15 @@ def _distances(result: Result) -> dict[str, dict[str, float]]:
 
 
 def _figures(off: Floats) -> dict[str, float]:
-    largest, mean, rms = off.max(), off.mean(), np.sqrt(np.mean(off**2))
-    named = zip(("mean_um", "rms_um", "largest_um"), (mean, rms, largest), strict=True)
-    return {name: float(value / MICROMETRE) for name, value in named}
+    found = {"mean_um": off.mean(), "rms_um": np.sqrt(np.mean(off**2)), "largest_um": off.max()}
+    return {name: float(value / MICROMETRE) for name, value in found.items()}
 
 
 def results(result: Result) -> dict[str, Any]:
     """For results.json: distances, how points held out were predicted, and the rows of an arm as found."""
     predicted, found = predicted_poses(result.model), dict[str, Any](_distances(result))
     if predicted is not None:
-        shares = (float(inside.mean()) for inside in (predicted.within, predicted.inside))
-        shown = dict(zip(_SHARES, shares, strict=True))
+        shown = {of: float(own.mean()) for of, own in zip(_SHARES, (predicted.within, predicted.inside), strict=True)}
         found["held_out"] = {**_figures(predicted.off), **shown, "points": len(predicted.off)}
         noise = noise_by_pose(result.model)
         named = {"sigma_um": noise.sigma / MICROMETRE, "growing": noise.growing}

@@ -41,8 +41,7 @@ class ShiftedSeries:
     point: Ints
     noise_scale: Floats  # (n,) standard uncertainty of each mean over that of one ordinary reading
     time: Floats | None  # (n,) s; ``None`` where it was not recorded
-    # shifts, u_shift: (s,) nominal shift of each placing and the standard uncertainty of each against the first,
-    # mm
+    # shifts, u_shift: (s,) nominal shift of each placing and the standard uncertainty of each against the first, mm
     shifts: Floats
     u_shift: float
     cosine: Floats  # (s,) of the angle between artefact and axis in each placing, from the other two coordinates
@@ -203,8 +202,7 @@ def _cosines(means: Floats, series: Ints, along: int) -> Floats:
     return found
 
 
-# shifts whose rest is below this part of the smallest are multiples of each other, as far as smooth functions can
-# see
+# shifts whose rest is below this part of the smallest are multiples of each other, as far as smooth functions can see
 _MULTIPLE = 0.05
 
 

@@ -50,13 +50,7 @@ from cmm_uq.machine.model.artefact_doubt import form_faults
 from cmm_uq.machine.model.placed import Radial
 from cmm_uq.machine.model.recorded import expansion, refuse
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.effects.own_states import (
-    OUT_OF_ROUND,
-    ROUNDNESS,
-    about_axis,
-    lobes_about,
-    turned_back,
-)
+from cmm_uq.machine.physics.effects.own_states import OUT_OF_ROUND, ROUNDNESS, about_axis, lobes_about, turned_back
 from cmm_uq.maths.geometry.axial import axis_minimum
 from cmm_uq.maths.geometry.feature import centred, frame_about, upward
 from cmm_uq.maths.inference.linear_model import Freedoms

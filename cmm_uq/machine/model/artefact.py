@@ -137,6 +137,7 @@ class Artefact(ABC):
     leans: Floats = np.zeros(3)
     # of what readings go by beside its sizes nobody states an uncertainty, in a clause; with which observations (m,) do
     exact: tuple[tuple[Text, NDArray[np.bool_]], ...] = ()
+    observed: ClassVar[tuple[str, ...]] = ()  # columns that observations are made of, with their noise
     key_of_u: ClassVar[str] = "u_um"  # of ``[artefact]``, that says how uncertain its lengths are
 
     @cached_property
@@ -161,6 +162,10 @@ class Artefact(ABC):
     @abstractmethod
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """Points (n, 3) of an artefact with these sizes (s,), placed as near to ``true_xyz`` (n, 3) as it goes, mm."""
+
+    def without_noise(self, placed: Floats) -> Floats:
+        """Where points that are ``placed`` (n, 3), mm, lie: without what each was observed with, if that places it."""
+        return placed
 
     @abstractmethod
     def project(self, xyz: Floats, displacement: Floats) -> Floats:

@@ -73,6 +73,8 @@ class RecordingModel:
     # mm, what is not known of a coordinate however little the residuals scatter, as of a prediction that the recording is
     # compared with
     least_noise: float = 0.0
+    _abouts: dict[bytes, About] = field(default_factory=dict, init=False)
+    _placed: dict[bytes, Floats] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.artefact.acting(effect) for effect in self.effects))
@@ -276,7 +278,8 @@ class RecordingModel:
 
     def where(self, values: Floats) -> Floats:
         """Points (n, 3), mm, about which the model is linear at ``values``."""
-        return self.placed(values) if self.within is None else self.within.placed(self.within.estimate().about)
+        model, about = (self, values) if self.within is None else (self.within, self.within.estimate().about)
+        return model.artefact.without_noise(model.placed(about))
 
     def columns(self, effect: Effect, shape: Sequence[float], values: Floats) -> Floats:
         """Errors e of the points, (n, 3, j) in mm, for one unit of each coefficient of one effect beside the model's own."""
@@ -291,16 +294,9 @@ class RecordingModel:
         key = values.tobytes()
         if key not in self._abouts:
             self._abouts.clear()
-            self._abouts[key] = self._acting.about(self.artefact.points.at(self.placed(values)), self._split(values)[0])
+            points = self.artefact.points.at(self.artefact.without_noise(self.placed(values)))
+            self._abouts[key] = self._acting.about(points, self._split(values)[0])
         return self._abouts[key]
-
-    @cached_property
-    def _abouts(self) -> dict[bytes, About]:
-        return {}
-
-    @cached_property
-    def _placed(self) -> dict[bytes, Floats]:
-        return {}
 
     def placed(self, values: Floats) -> Floats:
         """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""

@@ -16,7 +16,7 @@ from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import every
-from cmm_uq.machine.physics.effect import Effect, Nonparametric
+from cmm_uq.machine.physics.effect import Effect, Nonparametric, along
 
 EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
 UNKNOWN_SD = 0.05  # mm, largest standard deviation of a nonparametric displacement
@@ -115,13 +115,13 @@ def possible_effects(artefact: Artefact) -> Iterator[Effect]:
 
 def _roughly(model: RecordingModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
     """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
-    along = effect.course(points)
-    if along is None or (span := float(np.ptp(along))) == 0:
+    course = effect.course(points)
+    if course is None or (span := float(np.ptp(course))) == 0:
         return
     over = span
     if effect.idealised_over in tuple(AXES):  # a guideway has no other form within a fraction of what was measured
         over = max(span, _SHORTEST_OVER * float(np.ptp(points.machine_xyz, axis=0).max()))
-    u = (2 * (along - along.min()) / over - span / over)[:, None, None]
+    u = (2 * (course - course.min()) / over - span / over)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
     basis = effect.mostly * model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
     every = np.concatenate([basis * (1 + s * u + t * (1.5 * u**2 - 0.5)) for s, t in forms], axis=2)
@@ -137,10 +137,10 @@ def refine(model: RecordingModel, values: Floats, explanation: Explanation, memb
     points = model.artefact.points.at(model.where(values))
     shaped = [i for i, member in enumerate(explanation.members) if member.shape]
     scaled = even_scale(effect, np.array([explanation.members[i].shape[0] for i in shaped]))
-    even, step = dict(zip(shaped, scaled, strict=True)), float(np.median(np.diff(np.sort(scaled))))
-    kept = list(explanation.members)
+    even, kept = dict(zip(shaped, scaled, strict=True)), list(explanation.members)
     for i in members:
         kept[i] = replace(kept[i], weight=kept[i].weight / len(_DIVIDED))
+        step = float(np.partition(np.abs(scaled - even[i]), 1)[1])  # to the nearest
         for part in (part for part in _DIVIDED if part):
             shape = (float(from_even_scale(effect, np.array(even[i] + part * step))),)
             kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
@@ -236,10 +236,10 @@ def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Itera
         if np.ptp(readings) < 1.0:
             continue
         functions = list(_functions(readings, SAME_PLACE))
-        for j, direction in enumerate(AXES):
-            members = tuple(Member(model.seen(_along(j, f), values), weight=w, values=f) for f, w in functions)
-            along, of = Verbatim(direction.upper()), Verbatim(axis.upper())
-            name = say("error along {direction} as a function of {axis}", direction=along, axis=of)
+        for direction in AXES:
+            members = tuple(Member(model.seen(along(direction, f), values), weight=w, values=f) for f, w in functions)
+            way, of = Verbatim(direction.upper()), Verbatim(axis.upper())
+            name = say("error along {direction} as a function of {axis}", direction=way, axis=of)
             term = Nonparametric(reading_name(axis), direction)
             yield Explanation(name, UNKNOWN, members, readings, term.of, term)
 
@@ -248,8 +248,8 @@ def _of_place(model: RecordingModel, points: Points, values: Floats) -> Iterator
     if np.sum(np.ptp(points.machine_xyz, axis=0) > 1.0) < 2:
         return
     factors = list(smooth_in_space(points.machine_xyz))
-    for j, direction in enumerate(AXES):
-        members = tuple(Member(model.seen(_along(j, factor), values)) for factor in factors)
+    for direction in AXES:
+        members = tuple(Member(model.seen(along(direction, factor), values)) for factor in factors)
         name = say("error along {direction} as a function of the place", direction=Verbatim(direction.upper()))
         yield Explanation(name, UNKNOWN, members)
 
@@ -258,14 +258,14 @@ def _of_time(model: RecordingModel, points: Points, values: Floats) -> Iterator[
     time = points.columns.get("time_s")
     if time is None or len(np.unique(time)) < 3:
         return
-    for i, axis in enumerate(AXES):
+    for axis in AXES:
         readings = points.readings[axis]
         if (half := 0.5 * float(np.ptp(readings))) < 1.0:
             continue
         lever = (readings / half)[:, None]
         constant = any(_in_proportion(effect, points, axis) for effect in model.effects)
         functions = _functions(time) if constant else _one_sided(_functions(time))
-        members = tuple(Member(model.seen(_along(i, lever * f), values), weight=w, values=f) for f, w in functions)
+        members = tuple(Member(model.seen(along(axis, lever * f), values), weight=w, values=f) for f, w in functions)
         name = say("scale of {axis} as a function of time", axis=Verbatim(axis.upper()))
         yield Explanation(name, UNKNOWN, members, time, "time_s", Nonparametric("time_s", axis, scale=True))
 
@@ -318,15 +318,9 @@ def directions(model: RecordingModel) -> Floats:
     return np.where(length > _SEEN, seen / np.maximum(length, _SEEN), 0.0)
 
 
-def _along(axis: int, factor: Floats) -> Floats:
-    displacement = np.zeros((len(factor), 3, factor.shape[1]))
-    displacement[:, axis] = factor
-    return displacement
-
-
 def covariates(model: RecordingModel) -> dict[str, Floats]:
-    """Mean (m,) of every recorded column of each observation, and its place in the order of time where one is recorded."""
-    found = {name: mean_of(model, values) for name, values in model.artefact.points.own_columns.items()}
+    """Columns (m,) that an observation is a function of, and its place in the order of time where one is recorded."""
+    found = means_of_columns(model)
     if "time_s" in found:
         found["order"] = np.unique(found["time_s"], return_inverse=True)[1].ravel().astype(np.float64)
     kept: dict[str, Floats] = {}
@@ -336,9 +330,11 @@ def covariates(model: RecordingModel) -> dict[str, Floats]:
     return kept
 
 
-def mean_of(model: RecordingModel, values: Floats) -> Floats:
-    """Mean of a column (n,) over the points of each used observation, (m,)."""
-    return np.asarray(values[model.artefact.rows].mean(axis=1)[model.used], dtype=np.float64)
+def means_of_columns(model: RecordingModel) -> dict[str, Floats]:
+    """Mean (m,) over the points of each used observation of every column but those that it is made of, with their noise."""
+    artefact, own = model.artefact, model.artefact.points.own_columns
+    known = {name: values for name, values in own.items() if name not in artefact.observed}
+    return {name: values[artefact.rows].mean(axis=1, dtype=float)[model.used] for name, values in known.items()}
 
 
 def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, float]]:

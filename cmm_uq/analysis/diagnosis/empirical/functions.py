@@ -21,6 +21,7 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points, reading_name
 from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import RecordingModel
+from cmm_uq.machine.physics.effect import along as displaced
 
 SMOOTH, ROUGH = "smooth", "rough"  # of no form in particular, with a slope everywhere and without
 PRODUCT, BOWL, SINE = "product", "bowl", "sine"  # forms, the first two of two readings
@@ -256,9 +257,7 @@ def _of_points(model: RecordingModel, values: Floats, comparison: CandidateCompa
 
     def moving(along: str, lever: Floats | float = 1.0) -> Seen:
         def seen(f: Floats) -> Floats:
-            e = np.zeros((len(f), 3, f.shape[1]))
-            e[:, AXES.index(along)] = (np.asarray(lever) * f.T).T
-            return np.asarray(model.seen(e, values) / scale[:, None])
+            return np.asarray(model.seen(displaced(along, (np.asarray(lever) * f.T).T), values) / scale[:, None])
 
         return seen
 
@@ -302,22 +301,20 @@ def _of_products(model: RecordingModel, values: Floats, comparison: CandidateCom
     scale, points = comparison.noise_scale, model.artefact.points.at(model.where(values))
     varied, readings = _varied(points), {axis: read for axis, read in points.readings.items() if np.ptp(read) > 1.0}
     keys = [key for key in (*(f"approach_{a}" for a in AXES), *varied) if key in points.columns]
-    for along, key, (axis, read) in product(range(3), keys, readings.items()):
-        of = FunctionTerm(f"{key},{reading_name(axis)}", _of_both(AXES[along], in_words(key), axis), AXES[along])
+    for along, key, (axis, read) in product(AXES, keys, readings.items()):
+        of = FunctionTerm(f"{key},{reading_name(axis)}", _of_both(along, in_words(key), axis), along)
         arm, formula, part = _centred(read)[:, None], _arm(_variable(axis), read), _TURNED
         if key in varied:
             f, formula = _centred(varied[key][1])[:, None] * arm, f"{_arm(*varied[key])}*{formula}"
         else:
             f, formula, part = points.columns[key][:, None] * np.hstack([arm**0, arm]), f"{key};{key}*{formula}", 1.0
-        e = np.zeros((len(read), 3, f.shape[1]))
-        e[:, along] = UNKNOWN_SD * f
-        yield _without_curve(of, PRODUCT, model.seen(e, values) / scale[:, None], float(np.log(part)), formula)
+        seen = model.seen(displaced(along, UNKNOWN_SD * f), values) / scale[:, None]
+        yield _without_curve(of, PRODUCT, seen, float(np.log(part)), formula)
 
 
 def _of_observations(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Families:
     scale = comparison.noise_scale
-    for key, column in model.artefact.points.own_columns.items():
-        mean = candidate.mean_of(model, column)
+    for key, mean in candidate.means_of_columns(model).items():
         if len(np.unique(mean)) > 2:
             title = say("error as a function of {name}", name=in_words(key))
             yield from _families(FunctionTerm(key, title), lambda f: f / scale[:, None], mean)

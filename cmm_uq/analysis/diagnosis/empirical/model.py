@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, effect_of
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, UNKNOWN_SD, Explanation, effect_of
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.empirical import evidence
@@ -165,10 +165,10 @@ def _of_sines(data: FunctionFit, of: Sequence[int]) -> float:
     return float(scipy.special.expit(own - other))
 
 
-def of_effect(result: SearchResult, index: int, data: FunctionFit) -> tuple[float, float]:
+def of_effect(result: SearchResult, i: int, data: FunctionFit, of: Explanation | None = None) -> tuple[float, float]:
     """Log evidence and prior of an effect in its own form, and in its other forms, as if it were a function of the fit."""
     known, scale = result.first.explanations, result.first.comparison.noise_scale[:, None, None]
-    members, prior = known[index].members, float(log_prior(known)[index] - np.log(SHARES[UNKNOWN]))
+    members, prior = (of or known[i]).members, float(log_prior(known)[i] - np.log(SHARES[UNKNOWN]))
     whole, found = sum(one.weight for one in members), [-np.inf, -np.inf]
     for rough, width in {(one.rough, one.columns.shape[1]) for one in members}:
         some = [one for one in members if (one.rough, one.columns.shape[1]) == (rough, width)]

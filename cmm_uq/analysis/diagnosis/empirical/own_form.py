@@ -7,7 +7,7 @@ from itertools import combinations as subsets
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, Explanation, effect_of
+from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, Explanation, effect_of, refine
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import SHARES, log_prior
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, withhold
 from cmm_uq.analysis.diagnosis.empirical.evidence import FunctionFit
@@ -51,6 +51,9 @@ def _own_form(
     known, without = result.first.explanations[i], _without(result, data, i)
     effect, terms = effect_of(known), {(t.of, t.along) for t in known.imitated_by}
     of, straight, periodic = {*effect.columns, *(t.of for t in known.imitated_by)}, effect.everywhere, _periodic(known)
+    if periodic:  # half way between two periods a strong wave loses evidence, and waves that wander do not
+        member, log, _ = result.first.comparison.of_versions(i, [v for v in result.versions if v.explanation != i])
+        known = refine(result.first.model, result.first.values, known, [int(member[np.argmax(log)])])
     if straight and not _doubtful(result, i):
         return 1.0, None
     if not straight and (other := next((one for one in beside if of & set(one.of.split(","))), None)):
@@ -65,7 +68,7 @@ def _own_form(
     # a curve of rotation of which it is the straight line is another form of it
     curves = [np.logaddexp.reduce(without.of_family(f)[0], axis=None) for f in alike if f.form != PRODUCT]
     without = replace(without, families=[f for f in others if not any(f is one for one in alike)]).refined()
-    own, another = np.array(of_effect(result, i, without)) - np.log(known.weight)  # its rarity was counted before
+    own, another = np.array(of_effect(result, i, without, known)) - np.log(known.weight)  # its rarity was counted
     another = np.logaddexp.reduce([another, *curves])
     functions = np.logaddexp(without.total, _waves(result, without, known, i) if periodic else -np.inf)
     mechanism, every = np.logaddexp(own, another), np.logaddexp.reduce([own, another, functions])
