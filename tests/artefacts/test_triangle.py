@@ -8,7 +8,6 @@ import pytest
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.triangle import (
     SEVEN_PLACINGS,
-    SHIFTED,
     Placing,
     Triangle,
     TriangleStandard,
@@ -18,6 +17,7 @@ from cmm_uq.artefacts.triangle import (
 )
 from cmm_uq.artefacts.triangle_page import PARAMETERS, solve_equations
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.certificate.document import Plot
 from tests.artefacts.constructions import estimated, free, indicated, model
@@ -38,6 +38,7 @@ TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
 MACHINE = Machine("moving table Y", "YXZ", TRAVEL)
 TRUTH = [30.0, -20.0, 15.0, 12.0, -7.0, 9.0, 5.0, -8.0, 6.0, 3.0, -4.0, 7.0, 2.0, 6.0, -9.0]
 """Scales in ppm, squareness in ″, rotations in ″/m, in the order of PARAMETERS."""
+SHIFTED = Placing(Verbatim("horizontal, low, shifted along X"), "XY", (1.0, 0.5, 0.0))  # the eighth
 
 
 def seven() -> Points:
