@@ -302,8 +302,7 @@ class RecordingModel:
         """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""
         key = values.tobytes()
         if key not in self._placed:
-            coefficients, sizes = self._split(values)
-            xyz = self.artefact.points.xyz
+            (coefficients, sizes), xyz = self._split(values), self.artefact.points.xyz
             self._placed.clear()
             self._placed[key] = self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
             self._placed[key].flags.writeable = False
