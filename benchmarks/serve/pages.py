@@ -40,7 +40,7 @@ def timed(site: Site, target: str, *, anew: bool = False) -> tuple[float, float,
     asked, wall, processor, size = WebRequest("GET", *read_address(target)), [], [], 0
     for _ in range(TIMES):
         if anew:
-            site.forget()
+            site._kept = None
         begun = time.perf_counter(), time.process_time()
         answer = site.answer(asked)
         wall.append(time.perf_counter() - begun[0])

@@ -11,7 +11,7 @@ from __future__ import annotations
 import datetime as dt
 import string
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from html import escape
 from types import MappingProxyType
 from typing import Any, Self
@@ -74,7 +74,9 @@ class Message(Text):
     arguments: Mapping[str, Argument]
 
     def __new__(cls, pattern: str, arguments: Mapping[str, Argument]) -> Self:
-        message = super().__new__(cls, _ENGLISH.vformat(pattern, (), arguments))
+        parts = parts_of(pattern)
+        english = [text + field(arguments[name], spec) if name is not None else text for text, name, spec in parts]
+        message = super().__new__(cls, "".join(english))
         kept = {name: value if isinstance(value, Text) else _plain(value) for name, value in arguments.items()}
         message.pattern, message.arguments = pattern, MappingProxyType(kept)
         return message
@@ -108,23 +110,26 @@ def _plain(value: float) -> float:
     return value if item is None else item()
 
 
-class PatternFormatter(string.Formatter):
-    """``str.format`` with names only, and capitals."""
-
-    def format_field(self, value: Any, format_spec: str) -> str:
-        """One argument; ``capital`` and ``small`` change the first letter of a text."""
-        if format_spec not in ("capital", "small"):
-            return printed(value, format_spec)
-        first, rest = str.__getitem__(value, slice(0, 1)), str.__getitem__(value, slice(1, None))
-        return (first.upper() if format_spec == "capital" else first.lower()) + rest
+@cache
+def parts_of(pattern: str) -> tuple[tuple[str, str | None, str], ...]:
+    """Each literal of a pattern with the name and the format of the placeholder behind it; ``None`` behind the last."""
+    parts = string.Formatter().parse(pattern)
+    return tuple((literal, name, f"!{quoted}" if quoted else spec or "") for literal, name, spec, quoted in parts)
 
 
-_ENGLISH = PatternFormatter()
+def field(value: Any, spec: str) -> str:
+    """One argument; ``capital`` and ``small`` change the first letter of a text, ``!r`` puts it in quotes."""
+    if spec == "!r":
+        return repr(value)
+    if spec not in ("capital", "small"):
+        return printed(value, spec)
+    first, rest = str.__getitem__(value, slice(0, 1)), str.__getitem__(value, slice(1, None))
+    return (first.upper() if spec == "capital" else first.lower()) + rest
 
 
 def fields_of(pattern: str) -> frozenset[str]:
     """Names of a pattern's placeholders."""
-    return frozenset(name for _, name, _, _ in _ENGLISH.parse(pattern) if name)
+    return frozenset(name for _, name, _ in parts_of(pattern) if name)
 
 
 def say(pattern: str, /, **arguments: Argument) -> Message:

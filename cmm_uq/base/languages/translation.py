@@ -17,7 +17,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self, get_args
 
-from cmm_uq.base.messages import Argument, Day, Message, Number, PatternFormatter, Plural, Text, fields_of, printed
+from cmm_uq.base.messages import Argument, Day, Message, Number, Plural, Text, field, fields_of, parts_of, printed
 from cmm_uq.base.values import dataclass
 
 Code = Literal["en", "de", "fr", "ja"]  # of a language, by BCP 47
@@ -160,13 +160,12 @@ def _filled(message: Message, language: Language) -> str:
     arguments: Mapping[str, Argument] = message.arguments
     if isinstance(message, Plural):  # another language may need what one of the English forms leaves out
         arguments = {**message.one.arguments, **message.many.arguments, **arguments}
-    pattern, formatter = _pattern(message, language), _formatter(language)
     parts: list[str] = []
     joins: list[int] = []
-    for literal, name, spec, _ in formatter.parse(pattern):
+    for literal, name, spec in parts_of(_pattern(message, language)):
         value = "" if name is None else arguments[name]
         value = translated(value, language.code) if isinstance(value, Text) else value
-        text = formatter.format_field(value, spec or "")
+        text = "" if name is None else _field(value, spec, language)
         if literal == ", " and parts and _FIGURES.fullmatch(parts[-1]) and _FIGURES.fullmatch(text):
             joins.append(len(parts))
         parts += [literal, text]
@@ -191,18 +190,8 @@ def _pattern(message: Message, language: Language) -> str:
     return patterns.single.get(message.pattern, message.pattern) if form is None else form
 
 
-class _Localised(PatternFormatter):
+def _field(value: Any, spec: str, language: Language) -> str:
     """Numbers as the language writes them; in one without capitals nothing is changed to one."""
-
-    def __init__(self, language: Language) -> None:
-        self.language = language
-
-    def format_field(self, value: Any, format_spec: str) -> str:
-        if not isinstance(value, str):
-            return self.language.number(printed(value, format_spec))
-        if format_spec in ("capital", "small") and not self.language.cases:
-            return str.__str__(value)
-        return super().format_field(value, format_spec)
-
-
-_formatter = cache(_Localised)
+    if not isinstance(value, str):
+        return language.number(printed(value, spec))
+    return str.__str__(value) if spec in ("capital", "small") and not language.cases else field(value, spec)
