@@ -36,7 +36,8 @@ class Indexer:
         self.connection = connection
         self._rows: dict[Table, list[Row]] = {table: [] for table in INDEX}
         self._recognised: dict[Table, dict[str, Row]] = {machines: {}, artefacts: {}}
-        self._same: dict[str, list[Row]] = {}  # machines of one serial number, until another becomes known
+        self._called: set[str] = set()  # names of machines that are new
+        self._same: dict[str, dict[int, Row]] = {}  # machines of one serial number, by the numbers of their rows
         self._quantities: dict[tuple[str, str, str], int] = {}
         self._certificates: dict[int, Row] = {}
         self._counts: dict[Table, int] = {}
@@ -148,21 +149,20 @@ class Indexer:
         """The one machine of that serial number, of several that of the name; without ``of_part`` of those of parts alone."""
         if (found := self._same.get(own)) is None:
             query = select(machines).where(machines.c.spelled == own)
-            stored = {row["id"]: dict(row) for row in self.connection.execute(query).mappings()}
-            cached = (row for row in self._recognised[machines].values() if row["spelled"] == own)
-            found = self._same[own] = list({**stored, **{row["id"]: row for row in cached}}.values())
-        rows = [row for row in found if of_part or row["recognised"].startswith(facts.BY_PART)]
+            stored = self.connection.execute(query).mappings()  # all: none is made before this is asked
+            found = self._same[own] = {row["id"]: dict(row) for row in stored}
+        rows = [row for row in found.values() if of_part or row["recognised"].startswith(facts.BY_PART)]
         rows = [row for row in rows if row["named"] == named] if len(found) > 1 else rows
         return rows[0] if len(rows) == 1 else None
 
     def _name_of(self, said: Mapping[str, Any]) -> str:
         """As it is asked for: its serial, and where another has the same, what tells them apart behind it."""
         name = called(said, "serial", "name") or "unnamed"
-        others = {row["called"] for row in self._recognised[machines].values()}
         further = (called(said, "manufacturer", "name") or "other", *range(2, 100))
         for candidate in (name, *(f"{name} ({end})" for end in further)):
             there = select(machines.c.called).where(machines.c.called == candidate)
-            if candidate not in others and not self.connection.execute(there).first():
+            if candidate not in self._called and not self.connection.execute(there).first():
+                self._called.add(candidate)
                 return candidate
         raise ValueError(name)
 
@@ -190,22 +190,25 @@ class Indexer:
         if row is None:
             row = {"id": self._next(table), "recognised": key, **first(), **said, "day": day, "entry": entry}
             self._rows[table].append(row)
-            self._same.clear()
         elif changed := {
             name: value for name, value in said.items()
             if value != row[name] and (day >= row["day"] or (not row[name] and name in _FILLED))
         }:  # fmt: skip
             self._change(table, row, changed | ({"day": day, "entry": entry} if day >= row["day"] else {}))
-        self._recognised[table][key] = row
+        self._remember(table, row)
         return int(row["id"])
+
+    def _remember(self, table: Table, row: Row) -> None:
+        self._recognised[table][row["recognised"]] = row
+        if table is machines and row["spelled"] in self._same:
+            self._same[row["spelled"]][row["id"]] = row
 
     def _known(self, table: Table, key: str) -> Row | None:
         return self._recognised[table].get(key) or self._stored(table, table.c.recognised == key)
 
     def _change(self, table: Table, row: Row, changed: Row) -> None:
         row.update(changed)
-        self._same.clear()
-        self._recognised[table][row["recognised"]] = row
+        self._remember(table, row)
         waiting = self._rows[table]
         if not waiting or row["id"] < waiting[0]["id"]:  # it is written already: rows are numbered as they come
             self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))

@@ -28,6 +28,9 @@ _CERTIFICATES = select(
 ).select_from(certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.artefact))
 
 
+Serials = Collection[str] | None
+"""Machines that are asked about, as the records call them; ``None`` for all."""
+
 RECORDED = ~machines.c.recognised.startswith(facts.BY_PART)
 """Machines of the records: what only reports of parts name is none until a certificate or an entry does."""
 
@@ -59,10 +62,10 @@ class RecordQueries:
         with told(self.place, rows=True), self.engine.connect() as connection:
             yield connection
 
-    def machines(self, on: dt.date | None = None) -> list[facts.RecordedMachine]:
-        """All machines, by serial, with the rules that are stated up to a day."""
+    def machines(self, on: dt.date | None = None, of: Serials = None) -> list[facts.RecordedMachine]:
+        """All machines, or those of some serials, by serial, with the rules that are stated up to a day."""
         with self.reading() as connection:
-            rows = _known_on(connection, machines, _RULE, on, RECORDED)
+            rows = [row for own in called(of) for row in _known_on(connection, machines, _RULE, on, RECORDED, *own)]
             days = _adjusted(connection, [row["id"] for row in rows])
             return [_machine(row, days[row["id"]]) for row in rows]
 
@@ -118,21 +121,24 @@ class RecordQueries:
         return []
 
     def latest(
-        self, until: dt.date | None = None, *, values: bool = True, states: Collection[str] = facts.STANDING
-    ) -> list[facts.RecordedCertificate]:
+        self, until: dt.date | None = None, *, values: bool = True, states: Collection[str] = facts.STANDING,
+        of: Serials = None,
+    ) -> list[facts.RecordedCertificate]:  # fmt: skip
         """Newest measured and standing certificate of each machine, none later than a day, by serial; no checks."""
         rows: list[facts.RecordedCertificate] = []
+        newest = select(newest_of_machine(until, states)).select_from(machines)
         with self.reading() as connection:
-            found = connection.execute(select(newest_of_machine(until, states)).select_from(machines)).scalars()
+            found = [entry for own in called(of) for entry in connection.execute(newest.where(*own)).scalars()]
             for block in blocks(sorted(entry for entry in found if entry is not None)):
                 rows += self._certificates(connection, _CERTIFICATES.where(_C.entry.in_(block)), values=values)
         return sorted(rows, key=lambda one: (one.machine, one.entry))
 
-    def checks(self) -> list[facts.RecordedCertificate]:
-        """Measured interim checks of all machines, neither withdrawn nor replaced, by day, then entry."""
+    def checks(self, of: Serials = None) -> list[facts.RecordedCertificate]:
+        """Measured interim checks, neither withdrawn nor replaced, by day, then entry."""
+        query = _CERTIFICATES.where(*_measured(_C), _C.interim.is_(True))
         with self.reading() as connection:
-            query = _CERTIFICATES.where(*_measured(_C), _C.interim.is_(True)).order_by(_C.day, _C.entry)
-            return self._certificates(connection, query)
+            found = [one for own in called(of) for one in self._certificates(connection, query.where(*own))]
+        return sorted(found, key=lambda one: (one.day, one.entry))
 
     def limited(self, entries: Sequence[int]) -> set[int]:
         """Those of the certificates, by the numbers of their entries, that set a limit to any value."""
@@ -270,9 +276,14 @@ def adjusted_before(stated: str | None, day: str, adjusted: Sequence[str]) -> dt
     return dt.date.fromisoformat(adjusted[before - 1]) if before else None
 
 
-def blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
+def blocks(numbers: Sequence[Any]) -> Iterable[Sequence[Any]]:
     """So many at a time as a query takes."""
     return (numbers[i : i + _TOGETHER] for i in range(0, len(numbers), _TOGETHER))
+
+
+def called(of: Serials) -> Iterable[tuple[ColumnElement[bool], ...]]:
+    """Conditions of queries that together find the machines of some serials, each once; one, of nothing, for all."""
+    return [()] if of is None else [(machines.c.called.in_(block),) for block in blocks(sorted(of))]
 
 
 _RULE, _ARTEFACT = ("calibrate",), ("called", "kind", "certificate", "laboratory", "calibrated", "due")
