@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -159,9 +158,14 @@ def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     request.only(("text", "state", "place", "page"))
     text, state, place = request.text("text"), request.one_of("state", tuple(v.GROUPS)), request.text("place")
     request.count("page")  # refused before anything is worked out
-    machines = view.standing()
-    found = [one for one in machines if _has(one, text.casefold(), state, place)]
-    counts = Counter(group for one in machines for group in one.groups)
+    overview, folded = view.standing(), text.casefold()
+    machines, counts, places = overview.machines, overview.counts, overview.places
+    found: Sequence[v.MachineStanding] = machines
+    if text or state or place:
+        found = [
+            one for one in machines
+            if folded in one.names and (not state or state in one.groups) and place in ("", one.newest.machine.place)
+        ]  # fmt: skip
     tally = [
         {"number": counts[name], "what": group.count, "address": "/" if name == state else p.address("/", state=name),
          "standing": group.standing, "chosen": name == state}
@@ -170,19 +174,11 @@ def machines_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
     rows = tuple(_row(one) for one in v.on_page(found, request))
     count = plural(len(found), one=say("1 machine"), many=say("{count} machines", count=number(len(found), ",d")))
     empty = say("No machine is as chosen.") if machines else say("No machine is recorded yet.")
-    places = sorted({one.newest.machine.place for one in machines} - {""})
     return _list(
         "machines.html", request, p.PageTable(count, COLUMNS, rows, empty), len(found), today=day(view.today), counts=tally,
         overdue=_overdue_artefacts(view), states=[(name, group.word) for name, group in v.GROUPS.items()],
         places=[(one, Verbatim(one)) for one in places] if 1 < len(places) <= MOST_PLACES else [],
     )  # fmt: skip
-
-
-def _has(one: v.MachineStanding, text: str, state: str, place: str) -> bool:
-    machine = one.newest.machine
-    names = (machine.serial, machine.name, machine.manufacturer, machine.model, machine.place)
-    chosen = (not state or state in one.groups) and (not place or place == machine.place)
-    return chosen and (not text or any(text in name.casefold() for name in names))
 
 
 def _overdue_artefacts(view: v.SiteView) -> tuple[Text, Text] | None:
@@ -232,7 +228,7 @@ def machine_page(view: v.SiteView, request: WebRequest) -> p.WebPage:
         machine = view.records.machine(serial)
     except CmmUqError as error:
         raise RefusedRequest(HTTPStatus.NOT_FOUND, *v.problem_of(error)) from None
-    standing = next((one for one in view.standing() if one.serial == machine.serial), None)
+    standing = next((one for one in view.standing().machines if one.serial == machine.serial), None)
     newest = None if standing is None else standing.newest.certificate
     listed, count = chosen(view.records, CertificateFilter(machine=machine.serial), LISTED)
     caption = say("The newest {shown} of {count}", shown=number(len(listed)), count=number(count, ",d"))

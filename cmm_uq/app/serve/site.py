@@ -220,7 +220,7 @@ class Site(Application):
         self.place = shown(self._where)  # without a password
         self._due, self._today = due, today
         self._lock = threading.Lock()
-        self._kept: tuple[tuple[int, str, dt.date], Sequence[v.MachineStanding]] | None = None
+        self._kept: v.Overview | None = None
         self.checking = v.ChainComparing(self.opened)
 
     def opened(self) -> Records:
@@ -245,14 +245,13 @@ class Site(Application):
     def foot(self, page: p.WebPage) -> Text:
         return say("Records: {place}. To be looked at only: nothing here can be changed.", place=Verbatim(self.place))
 
-    def _standing(self, records: Records, today: dt.date) -> Sequence[v.MachineStanding]:
-        head = (*records.head(), today)
+    def _standing(self, records: Records, today: dt.date) -> v.Overview:
         with self._lock:  # worked out once: who asks meanwhile would only do the same
-            if self._kept is None or self._kept[0] != head:
-                self._kept = head, v.overview(records, self._due, today)
-            return self._kept[1]
+            if self._kept is None or (self._kept.head, self._kept.today) != (records.head(), today):
+                self._kept = v.overview(records, self._due, today, self._kept)
+            return self._kept
 
     def machines(self) -> Sequence[v.MachineStanding]:
         """How every machine stands, the most urgent first."""
         with self.opened() as records:
-            return self._standing(records, self._today())
+            return self._standing(records, self._today()).machines

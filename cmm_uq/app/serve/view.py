@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import threading
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple, TypeVar
@@ -17,16 +18,20 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.due.due import DueItem
+from cmm_uq.laboratory.due.rule import Rule
 from cmm_uq.laboratory.records.facts import ChainFinding
 from cmm_uq.laboratory.records.listing import (
     CertificateFilter,
     ListedCertificate,
     ListedPart,
     Newest,
+    changed_machines,
     chosen,
     parts_of,
     standing_of_all,
+    unsettled_machines,
 )
+from cmm_uq.laboratory.records.queries import Serials
 from cmm_uq.laboratory.records.store import Records
 
 MOST = 100  # findings that are shown
@@ -96,7 +101,7 @@ class SiteView:
 
     records: Records
     today: dt.date
-    standing: Callable[[], Sequence[MachineStanding]]
+    standing: Callable[[], Overview]
     checking: ChainComparing
 
 
@@ -211,12 +216,14 @@ def problem_of(error: CmmUqError) -> tuple[Text, Text]:
 SOON = dt.timedelta(days=60)  # what is due within it is shown before it is late
 
 
-DueDates = Callable[[Records, dt.date], Mapping[str, DueItem]]  # on a day, by serial, of machines that have a date
+DueDates = Callable[
+    [Records, dt.date, Serials], Mapping[str, DueItem]
+]  # on a day, by serial, of those that have a date
 
 
-def by_rule(records: Records, today: dt.date) -> dict[str, DueItem]:
-    """Of all machines, each by its own rule, its interim checks and its adjustments."""
-    found = due_in(records, (), today) if records.head()[0] else []
+def by_rule(records: Records, today: dt.date, of: Serials = None) -> dict[str, DueItem]:
+    """Of all machines, or some, each by its own rule, its interim checks and its adjustments."""
+    found = due_in(records, of or (), today) if records.head()[0] and of != set() else []
     return {one.serial: one for one in found if one.item == "machine"}
 
 
@@ -248,17 +255,50 @@ class MachineStanding(NamedTuple):
     newest: Newest
     due: DueItem | None
     groups: tuple[str, ...]
+    names: str  # by which it is searched for
 
     @property
     def serial(self) -> str:
         return self.newest.machine.serial
 
+    @classmethod
+    def of(cls, newest: Newest, due: DueItem | None, today: dt.date) -> MachineStanding:
+        machine = newest.machine
+        names = (machine.serial, machine.name, machine.manufacturer, machine.model, machine.place)
+        return cls(newest, due, groups(newest, due, today), "\n".join(names).casefold())
 
-def overview(records: Records, due: DueDates, today: dt.date) -> tuple[MachineStanding, ...]:
-    """Every machine, the most urgent first, then by due date."""
-    newest, days = standing_of_all(records), due(records, today)
-    dated = ((one, days.get(one.machine.serial)) for one in newest)
-    return in_order([MachineStanding(one, date, groups(one, date, today)) for one, date in dated])
+
+@dataclass(frozen=True)
+class Overview:
+    """How every machine stands on a day, the most urgent first, with the last entry of the records."""
+
+    head: tuple[int, str]
+    today: dt.date
+    machines: tuple[MachineStanding, ...]
+    artefacts: Mapping[str, dt.date | None]  # by serial, until when its calibration is valid
+    counts: Mapping[str, int]  # of machines in a group
+    places: tuple[str, ...]
+
+
+MOST_ANEW = 1000  # machines of which each is looked up by itself: of more, all are
+
+
+def overview(records: Records, due: DueDates, today: dt.date, before: Overview | None = None) -> Overview:
+    """Every machine; of those of which nothing was entered since, and no artefact is due otherwise, as before."""
+    head, artefacts = records.head(), {one.serial: one.due for one in records.artefacts(today)}
+    changed: set[str] | None = None
+    if before is not None and before.today == today and (later := changed_machines(records, *before.head)) is not None:
+        other = {serial for serial, day in (artefacts.items() ^ before.artefacts.items())}
+        with_other = {one.serial for one in before.machines if one.due is not None and one.due.artefact in other}
+        changed = later | with_other | unsettled_machines(records, today, lambda rule: Rule.of(rule).pooled)
+        changed = changed if len(changed) <= MOST_ANEW else None
+    newest, days = standing_of_all(records, changed), due(records, today, changed)
+    found = [MachineStanding.of(one, days.get(one.machine.serial), today) for one in newest]
+    kept = [] if before is None or changed is None else [one for one in before.machines if one.serial not in changed]
+    machines = in_order([*kept, *found])
+    counts = Counter(group for one in machines for group in one.groups)
+    places = {one.newest.machine.place for one in machines} - {""}
+    return Overview(head, today, machines, artefacts, counts, tuple(sorted(places)))
 
 
 def in_order(machines: Sequence[MachineStanding]) -> tuple[MachineStanding, ...]:

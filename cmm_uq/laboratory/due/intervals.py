@@ -19,10 +19,8 @@ limits falls to the target. Source: suncal 1.7.1 and its tests, which quote NASA
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
 from hashlib import sha256
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import scipy
@@ -243,13 +241,6 @@ KNOWN: dict[str, DriftInterval] = {}
 """What was found by drift, by the hash of what it came from, for whoever keeps it: only new histories take time then."""
 
 
-@cache
-def _program() -> str:
-    """What computes them: another program may come to other days."""
-    sources = b"".join(file.read_bytes() for file in sorted(Path(__file__).parent.glob("*.py")))
-    return f"{sha256(sources).hexdigest()} {np.__version__} {scipy.__version__}"
-
-
 def drift_interval(
     certificates: Sequence[RecordedCertificate], reliability: float, priors: Mapping[str, DriftPrior]
 ) -> DriftInterval:
@@ -370,7 +361,7 @@ def _control_chart(
 
 
 def _drift(rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
-    key = sha256(repr((_program(), certificates, rule.reliability)).encode()).hexdigest()
+    key = sha256(repr((rules.program(), certificates, rule.reliability)).encode()).hexdigest()
     kept: dict[str, DriftInterval] = {} if priors else KNOWN  # a fleet learns with every entry
     length, name, learnt = kept[key] = kept.get(key) or drift_interval(certificates, rule.reliability, priors)
     why = say("{model}: {name} has not crossed its limit with {target} % for {reached}", name=Verbatim(name),

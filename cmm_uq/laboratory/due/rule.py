@@ -29,14 +29,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
 from itertools import pairwise
+from pathlib import Path
 from statistics import NormalDist
 from typing import Any, Literal
 
+from cmm_uq import __version__
 from cmm_uq.base.messages import Text, plural, say
 from cmm_uq.base.values import dataclass, fields, replace
 from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedValue
+
+
+@cache
+def program() -> str:
+    """What computes days: another program may come to others."""
+    folders = (Path(__file__).parent, Path(__file__).parents[1] / "records")
+    sources = b"".join(file.read_bytes() for folder in folders for file in sorted(folder.glob("*.py")))
+    return " ".join((__version__, sha256(sources).hexdigest(), *map(version, ("numpy", "scipy"))))
 
 
 @dataclass(frozen=True)
@@ -82,6 +95,11 @@ class Rule:
         given = {name: value for name, value in said.items() if value is not None and name in known}
         given.setdefault("method", "A3" if "reliability" in given else "fixed")
         return cls(**given, stated=True)
+
+    @property
+    def pooled(self) -> bool:
+        """Whether it takes what calibrations of other machines of the model found."""
+        return self.method in ("A3", "S2")
 
     @property
     def days(self) -> float:

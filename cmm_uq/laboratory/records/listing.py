@@ -7,18 +7,44 @@ from __future__ import annotations
 
 import datetime as dt
 import json
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, Connection, func, or_, select
+from sqlalchemy import ColumnElement, Connection, func, or_, select, union
 
 from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.verdicts import Verdicts, gravest
-from cmm_uq.laboratory.records.facts import BY_NAME, PART, PERFORMANCE, STANDING, Entry, RecordedMachine, spelled
+from cmm_uq.laboratory.records.facts import (
+    BY_NAME,
+    PART,
+    PERFORMANCE,
+    STANDING,
+    Entry,
+    RecordedMachine,
+    machine_key,
+    spelled,
+)
 from cmm_uq.laboratory.records.place import told
-from cmm_uq.laboratory.records.queries import RECORDED, adjusted_before, blocks, newest_of_machine
+from cmm_uq.laboratory.records.queries import (
+    RECORDED,
+    Serials,
+    adjusted_before,
+    blocks,
+    measured,
+    named,
+    newest_of_machine,
+)
 from cmm_uq.laboratory.records.store import Records
-from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
+from cmm_uq.laboratory.records.tables import (
+    adjustments,
+    artefacts,
+    certificates,
+    entries,
+    figures,
+    machines,
+    quantities,
+    signatures,
+)
 
 
 class ListedCertificate(NamedTuple):
@@ -74,8 +100,8 @@ _COLUMNS = (
 _JOINED = certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.artefact)
 
 
-def standing_of_all(records: Records) -> list[Newest]:
-    """Every machine with its newest certificate, in the order in which they were first recorded."""
+def standing_of_all(records: Records, of: Serials = None) -> list[Newest]:
+    """Every machine, or those of some serials, with its newest certificate, in the order in which they were first recorded."""
     m = machines.c
     query = (
         select(m.called, m.name.label("of_name"), m.manufacturer, m.model, m.place, m.recognised, *_COLUMNS)
@@ -84,11 +110,42 @@ def standing_of_all(records: Records) -> list[Newest]:
         .where(RECORDED).order_by(m.id)
     )  # fmt: skip
     with records.reading() as connection:
-        rows = connection.execute(query).all()
+        rows = [row for own in named(of) for row in connection.execute(query.where(*own))]
     return [
         Newest(RecordedMachine(*row[:5], (), row[5].startswith(BY_NAME)), None if row[6] is None else _listed(row[6:]))
         for row in rows
     ]
+
+
+def changed_machines(records: Records, number: int, of: str) -> set[str] | None:
+    """Machines of which later entries say anything; ``None`` where these records have no entry of that number and hash."""
+    e, m, s, a = entries.c, machines.c, signatures.c, adjustments.c
+    stated = select(e.content).where(e.kind == "machine", e.number > number)
+    with records.reading() as connection:
+        if connection.execute(select(e.hash).where(e.number == number)).scalar() != of:
+            return None
+        said = {machine_key(json.loads(content)) for content in connection.execute(stated).scalars()}
+        later = (
+            select(_C.machine).where(_C.entry > number),
+            select(_C.machine).join(signatures, s.certificate == _C.entry).where(s.entry > number),
+            select(a.machine).where(a.entry > number),
+            select(m.id).where(or_(m.entry > number, m.recognised.in_(said))),
+        )
+        return set(connection.execute(select(m.called).where(m.id.in_(union(*later)))).scalars())
+
+
+def unsettled_machines(records: Records, on: dt.date, pooled: Callable[[Mapping[str, Any]], bool]) -> set[str]:
+    """Machines of which anything is dated after a day, or whose rule takes what others found."""
+    m, after = machines.c, on.isoformat()
+    with records.reading() as connection:
+        rules = connection.execute(select(m.calibrate).distinct().where(m.calibrate.is_not(None))).scalars()
+        common = [rule for rule in rules if pooled(json.loads(rule))]
+        unsettled = (
+            select(_C.machine).where(*measured(_C), _C.day > after),
+            select(adjustments.c.machine).where(adjustments.c.day > after),
+            select(m.id).where(or_(m.day > after, m.calibrate.in_(common))),
+        )
+        return set(connection.execute(select(m.called).where(m.id.in_(union(*unsettled)))).scalars())
 
 
 def chosen(

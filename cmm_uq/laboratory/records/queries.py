@@ -35,7 +35,7 @@ RECORDED = ~machines.c.recognised.startswith(facts.BY_PART)
 """Machines of the records: what only reports of parts name is none until a certificate or an entry does."""
 
 
-def _measured(c: Any, origin: str = "measured", command: str = "report") -> tuple[ColumnElement[bool], ...]:
+def measured(c: Any, origin: str = "measured", command: str = "report") -> tuple[ColumnElement[bool], ...]:
     """Reports of an origin that stand."""
     return c.command == command, c.origin == origin, c.state.in_(facts.STANDING)
 
@@ -65,7 +65,7 @@ class RecordQueries:
     def machines(self, on: dt.date | None = None, of: Serials = None) -> list[facts.RecordedMachine]:
         """All machines, or those of some serials, by serial, with the rules that are stated up to a day."""
         with self.reading() as connection:
-            rows = [row for own in called(of) for row in _known_on(connection, machines, _RULE, on, RECORDED, *own)]
+            rows = [row for own in named(of) for row in _known_on(connection, machines, _RULE, on, RECORDED, *own)]
             days = _adjusted(connection, [row["id"] for row in rows])
             return [_machine(row, days[row["id"]]) for row in rows]
 
@@ -128,16 +128,16 @@ class RecordQueries:
         rows: list[facts.RecordedCertificate] = []
         newest = select(newest_of_machine(until, states)).select_from(machines)
         with self.reading() as connection:
-            found = [entry for own in called(of) for entry in connection.execute(newest.where(*own)).scalars()]
+            found = [entry for own in named(of) for entry in connection.execute(newest.where(*own)).scalars()]
             for block in blocks(sorted(entry for entry in found if entry is not None)):
                 rows += self._certificates(connection, _CERTIFICATES.where(_C.entry.in_(block)), values=values)
         return sorted(rows, key=lambda one: (one.machine, one.entry))
 
     def checks(self, of: Serials = None) -> list[facts.RecordedCertificate]:
         """Measured interim checks, neither withdrawn nor replaced, by day, then entry."""
-        query = _CERTIFICATES.where(*_measured(_C), _C.interim.is_(True))
+        query = _CERTIFICATES.where(*measured(_C), _C.interim.is_(True))
         with self.reading() as connection:
-            found = [one for own in called(of) for one in self._certificates(connection, query.where(*own))]
+            found = [one for own in named(of) for one in self._certificates(connection, query.where(*own))]
         return sorted(found, key=lambda one: (one.day, one.entry))
 
     def limited(self, entries: Sequence[int]) -> set[int]:
@@ -152,7 +152,7 @@ class RecordQueries:
     def dated_after(self, day: dt.date) -> dict[str, dt.date]:
         """Machines with measured certificates or interim checks dated after a day, and the last such date of each."""
         query = select(machines.c.called, func.max(_C.day)).select_from(certificates.join(machines))
-        query = query.where(*_measured(_C), _C.day > day.isoformat()).group_by(machines.c.called)
+        query = query.where(*measured(_C), _C.day > day.isoformat()).group_by(machines.c.called)
         with self.reading() as connection:
             return {row[0]: dt.date.fromisoformat(row[1]) for row in connection.execute(query)}
 
@@ -162,7 +162,7 @@ class RecordQueries:
         query = select(e.content, e.number, _C.day, _C.folder, _C.number.label("called"), _C.decision)
         query = query.join(certificates, e.number == _C.entry).order_by(_C.day, _C.entry)
         with self.reading() as connection:
-            ours = query.where(_C.machine == _machine_id(connection, machine), *_measured(_C, command=facts.PART))
+            ours = query.where(_C.machine == _machine_id(connection, machine), *measured(_C, command=facts.PART))
             each = ((json.loads(row.content), row) for row in connection.execute(ours))
             return [
                 facts.MeasuredPart.of(
@@ -252,7 +252,7 @@ def _series(connection: Connection, query: Select[Any]) -> dict[int, dict[str, f
 def newest_of_machine(until: dt.date | None = None, states: Collection[str] = facts.STANDING) -> Any:
     """Entry of each machine's newest measured certificate that stands, as a subquery of ``machines``."""
     c = certificates.alias().c
-    query = select(c.entry).where(c.machine == machines.c.id, *_measured(c), c.interim.is_(False), c.state.in_(states))
+    query = select(c.entry).where(c.machine == machines.c.id, *measured(c), c.interim.is_(False), c.state.in_(states))
     if until:
         query = query.where(c.day <= until.isoformat())
     return query.order_by(c.day.desc(), c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
@@ -281,7 +281,7 @@ def blocks(numbers: Sequence[Any]) -> Iterable[Sequence[Any]]:
     return (numbers[i : i + _TOGETHER] for i in range(0, len(numbers), _TOGETHER))
 
 
-def called(of: Serials) -> Iterable[tuple[ColumnElement[bool], ...]]:
+def named(of: Serials) -> Iterable[tuple[ColumnElement[bool], ...]]:
     """Conditions of queries that together find the machines of some serials, each once; one, of nothing, for all."""
     return [()] if of is None else [(machines.c.called.in_(block),) for block in blocks(sorted(of))]
 
@@ -371,7 +371,7 @@ def _stated(names: Collection[str] | None, origin: str) -> Select[Any]:
     f, q, later = figures.c, quantities.c, certificates.alias().c
     same = [later[name] == _C[name] for name in ("machine", "job", "day", "interim")]
     same.append(later.adjusted_since.is_not_distinct_from(_C.adjusted_since))
-    instead = select(later.entry).where(*same, *_measured(later, origin))
+    instead = select(later.entry).where(*same, *measured(later, origin))
     instead = instead.where((later.state == "released") | (later.entry > _C.entry)).correlate(certificates)
     joined = certificates.join(figures, f.certificate == _C.entry).join(quantities, q.id == f.quantity)
     query = (
@@ -380,7 +380,7 @@ def _stated(names: Collection[str] | None, origin: str) -> Select[Any]:
             f.at_most.label("limit"), _C.entry, _C.adjusted_since, _C.interim,
         )
         .select_from(joined.outerjoin(artefacts, artefacts.c.id == _C.artefact))
-        .where(*_measured(_C, origin), (_C.state == "released") | ~instead.exists())
+        .where(*measured(_C, origin), (_C.state == "released") | ~instead.exists())
         .order_by(_C.day, _C.entry, f.place)
     )  # fmt: skip
     return query if names is None else query.where(q.name.in_(tuple(names)))

@@ -70,8 +70,7 @@ def test_what_is_longest_overdue_comes_first_then_what_fails() -> None:
     }
     machines = [newest(name, **said) for name, (said, _) in known.items()]
     stands = [
-        MachineStanding(one, due(days), groups(one, due(days), TODAY))
-        for one, (_, days) in zip(machines, known.values(), strict=True)
+        MachineStanding.of(one, due(days), TODAY) for one, (_, days) in zip(machines, known.values(), strict=True)
     ]
     assert [one.serial for one in in_order(stands)] == ["later", "late", "fails", "soon", "in order"]
 

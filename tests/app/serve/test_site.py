@@ -180,7 +180,7 @@ def test_a_page_of_a_long_list_leads_to_its_neighbours(tmp_path: Path) -> None:
 def test_due_dates_are_asked_of_who_serves(laboratory: Path) -> None:
     asked: list[dt.date] = []
 
-    def due(records: object, today: dt.date) -> dict[str, DueItem]:
+    def due(records: object, today: dt.date, of: object) -> dict[str, DueItem]:
         asked.append(today)
         return {
             "K1": DueItem("machine", "K1", "", "", "", None, dt.date(2026, 12, 24), say("it drifts")),

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import json
-import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import nullcontext
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -16,16 +15,16 @@ import numpy as np
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.limits import MODEL_BYTES, TABLE_BYTES, check_permitted, content_of
+from cmm_uq.base.files.limits import TABLE_BYTES, check_permitted, content_of
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.laboratory.due.doubt import parts_measured, with_parts
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
+from cmm_uq.laboratory.due.kept import KeptDates
 from cmm_uq.laboratory.due.rule import CompletedInterval, Pool, Rule, calibrations, ended_intervals, part_used
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine, Series
 from cmm_uq.laboratory.records.listing import outcomes_of
-from cmm_uq.laboratory.records.place import NONE
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
@@ -64,6 +63,7 @@ def read_fleet(file: Path | None) -> dict[str, FleetPrior]:
 
 
 SCHEMA = "cmm-uq/due/1"
+_FEW = 20  # machines of which whole histories are read
 WITHIN = dt.timedelta(days=90)  # how far ahead something is due and no longer later, where nothing is said
 
 
@@ -104,7 +104,7 @@ def what_is_due(
 ) -> WhatIsDue:
     day, learnt = on or _today(), read_fleet(fleet)
     with open_records(where, read_only=True) as records:
-        found = due_in(records, machines, day, learnt)
+        found = due_in(records, machines, day, learnt, within)
     kept = found if within is None else [one for one in found if one.due is None or one.due - day <= within]
     return WhatIsDue(day, WITHIN if within is None else within, tuple(kept))
 
@@ -114,57 +114,49 @@ def _today() -> dt.date:
 
 
 def due_in(
-    records: Records, machines: Collection[str], on: dt.date, fleets: Mapping[str, FleetPrior] = MappingProxyType({})
-) -> list[DueItem]:
-    artefacts = {one.serial: one for one in records.artefacts(on)}
-    chosen = {one.serial: one for one in (records.machine(serial, on) for serial in machines)}
-    asked = chosen.values() if machines else records.machines(on)
-    if not asked and not artefacts:
+    records: Records, machines: Collection[str], on: dt.date, fleets: Mapping[str, FleetPrior] = MappingProxyType({}),
+    within: dt.timedelta | None = None,
+) -> list[DueItem]:  # fmt: skip
+    """All that is asked about; ``within``: at least what is due within that time, or has no date."""
+    artefacts, kept = {one.serial: one for one in records.artefacts(on)}, KeptDates()
+    near: Collection[str] | None = None
+    if machines:
+        near = {records.machine(serial, on).serial for serial in machines}
+    elif within is not None and not fleets:  # a fleet learns with every entry
+        near = kept.near(records, on, on.toordinal() + within.days)
+    asked = records.machines(on, near)
+    if near is None and not asked and not artefacts:
         raise CmmUqError("no machine is recorded yet", where="records", fix="Record one: cmm-uq report JOB")
-    reading = _Reading(records, on, fleets, whole=bool(machines))
-    with _kept_intervals() if any(Rule.of(one.calibrate).method == "drift" for one in asked) else nullcontext():
+    reading = _Reading(records, on, fleets, near, whole=0 < len(machines) < _FEW)
+    by_drift = any(Rule.of(one.calibrate).method == "drift" for one in asked)
+    with kept.intervals() if by_drift else nullcontext():
         found = [machine_due(reading.known(one), artefacts, on, reading.pool(one)) for one in asked]
+    kept.write(found)
     used = {one.artefact for one in found} if machines else set(artefacts)
     return in_order([*found, *(artefact_due(artefacts[serial]) for serial in used if serial in artefacts)])
-
-
-@contextmanager
-def _kept_intervals() -> Iterator[None]:
-    """Intervals by drift as they were found of the same histories, in a file; one that fails costs time alone.
-
-    It is ``CMM_UQ_DATES``, or ``~/.cache/cmm-uq/dates.json``, or ``none``; one beyond what is read of a file is begun anew.
-    """
-    from cmm_uq.laboratory.due.intervals import KNOWN
-
-    file = Path(os.environ.get("CMM_UQ_DATES") or "~/.cache/cmm-uq/dates.json")
-    with suppress(CmmUqError, ValueError, TypeError, AttributeError, RuntimeError):
-        kept = json.loads(content_of(file.expanduser(), MODEL_BYTES, "")) if str(file) != NONE else {}
-        found = {key: (days, f"{name}", learnt is True) for key, (days, name, learnt) in kept.items() if days >= 0}
-        KNOWN.update(found)
-    before = len(KNOWN)
-    yield
-    with suppress(OSError, RuntimeError):
-        if len(KNOWN) > before and str(file) != NONE:
-            (file := file.expanduser()).parent.mkdir(parents=True, exist_ok=True)
-            own = file.with_name(f"{file.name}.{os.getpid()}")
-            own.write_text(json.dumps(KNOWN), encoding="utf-8")
-            own.replace(file)
 
 
 class _Reading:
     """Certificates of machines: all newest ones in one query, whole histories only where something needs them.
 
-    ``records, on``: where from, and up to which day; ``whole``: whether histories are read whole, of the few machines
-    that are asked for.
+    ``records, on, of``: where from, up to which day, of which machines; ``whole``: whether histories are read whole, of few.
     """
 
-    def __init__(self, records: Records, on: dt.date, fleets: Mapping[str, FleetPrior], *, whole: bool) -> None:
+    def __init__(
+        self,
+        records: Records,
+        on: dt.date,
+        fleets: Mapping[str, FleetPrior],
+        of: Collection[str] | None,
+        *,
+        whole: bool,
+    ) -> None:
         self.records, self._on, self._fleets, self._late = records, on, fleets, records.dated_after(on)
         self._pasts: dict[str, list[RecordedCertificate]] = {}
         self._pools: dict[tuple[str, str], list[CompletedInterval]] = {}
-        newest = [] if whole else records.latest(on, values=False)
-        released = [] if whole else records.latest(on, values=False, states=("released",))
-        checked = [] if whole else [one for one in records.checks() if one.day <= on]
+        newest = [] if whole else records.latest(on, values=False, of=of)
+        released = [] if whole else records.latest(on, values=False, states=("released",), of=of)
+        checked = [] if whole else [one for one in records.checks(of) if one.day <= on]
         each = ({one.machine: one for one in of} for of in (newest, released, checked))
         self._newest, self._released, self._checked = each
         undecided = [one.entry for one in newest if one.decision == "none"]
