@@ -220,7 +220,7 @@ class Site(Application):
         self.place = shown(self._where)  # without a password
         self._due, self._today = due, today
         self._lock = threading.Lock()
-        self._kept: v.Overview | None = None
+        self._kept: v.MachineOverview | None = None
         self.checking = v.ChainComparing(self.opened)
 
     def opened(self) -> Records:
@@ -245,7 +245,7 @@ class Site(Application):
     def foot(self, page: p.WebPage) -> Text:
         return say("Records: {place}. To be looked at only: nothing here can be changed.", place=Verbatim(self.place))
 
-    def _standing(self, records: Records, today: dt.date) -> v.Overview:
+    def _standing(self, records: Records, today: dt.date) -> v.MachineOverview:
         with self._lock:  # worked out once: who asks meanwhile would only do the same
             if self._kept is None or (self._kept.head, self._kept.today) != (records.head(), today):
                 self._kept = v.overview(records, self._due, today, self._kept)

@@ -101,7 +101,7 @@ class SiteView:
 
     records: Records
     today: dt.date
-    standing: Callable[[], Overview]
+    standing: Callable[[], MachineOverview]
     checking: ChainComparing
 
 
@@ -269,7 +269,7 @@ class MachineStanding(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Overview:
+class MachineOverview:
     """How every machine stands on a day, the most urgent first, with the last entry of the records."""
 
     head: tuple[int, str]
@@ -283,7 +283,7 @@ class Overview:
 MOST_ANEW = 1000  # machines of which each is looked up by itself: of more, all are
 
 
-def overview(records: Records, due: DueDates, today: dt.date, before: Overview | None = None) -> Overview:
+def overview(records: Records, due: DueDates, today: dt.date, before: MachineOverview | None = None) -> MachineOverview:
     """Every machine; of those of which nothing was entered since, and no artefact is due otherwise, as before."""
     head, artefacts = records.head(), {one.serial: one.due for one in records.artefacts(today)}
     changed: set[str] | None = None
@@ -298,7 +298,7 @@ def overview(records: Records, due: DueDates, today: dt.date, before: Overview |
     machines = in_order([*kept, *found])
     counts = Counter(group for one in machines for group in one.groups)
     places = {one.newest.machine.place for one in machines} - {""}
-    return Overview(head, today, machines, artefacts, counts, tuple(sorted(places)))
+    return MachineOverview(head, today, machines, artefacts, counts, tuple(sorted(places)))
 
 
 def in_order(machines: Sequence[MachineStanding]) -> tuple[MachineStanding, ...]:

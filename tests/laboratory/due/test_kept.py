@@ -13,7 +13,7 @@ import pytest
 
 from cmm_uq.app.commands.laboratory import due as command
 from cmm_uq.app.commands.laboratory.due import WhatIsDue, what_is_due
-from cmm_uq.app.serve.view import Overview, by_rule, overview
+from cmm_uq.app.serve.view import MachineOverview, by_rule, overview
 from cmm_uq.laboratory.due.due import machine_due
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import New, Records
@@ -112,7 +112,7 @@ def test_what_is_due_is_found_as_if_nothing_were_kept(
 def test_how_machines_stand_is_found_as_if_nothing_were_kept(count: int, tmp_path: Path) -> None:
     random = np.random.default_rng(count + 1)
     with made(tmp_path / "records.db", count, 2, seed=2) as records:
-        known: Overview | None = None
+        known: MachineOverview | None = None
         for round_ in range(1 if count < 1000 else 4):
             for one in entered(random, count, records):
                 records.append_all([one])
