@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import threading
+from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
@@ -216,9 +217,8 @@ def problem_of(error: CmmUqError) -> tuple[Text, Text]:
 SOON = dt.timedelta(days=60)  # what is due within it is shown before it is late
 
 
-DueDates = Callable[
-    [Records, dt.date, Serials], Mapping[str, DueItem]
-]  # on a day, by serial, of those that have a date
+DueDates = Callable[[Records, dt.date, Serials], Mapping[str, DueItem]]
+"""Of machines that have a date, by serial, on a day."""
 
 
 def by_rule(records: Records, today: dt.date, of: Serials = None) -> dict[str, DueItem]:
@@ -274,7 +274,7 @@ class MachineOverview:
 
     head: tuple[int, str]
     today: dt.date
-    machines: tuple[MachineStanding, ...]
+    machines: Sequence[MachineStanding]
     artefacts: Mapping[str, dt.date | None]  # by serial, until when its calibration is valid
     counts: Mapping[str, int]  # of machines in a group
     places: tuple[str, ...]
@@ -288,27 +288,31 @@ def overview(records: Records, due: DueDates, today: dt.date, before: MachineOve
     head, artefacts = records.head(), {one.serial: one.due for one in records.artefacts(today)}
     changed: set[str] | None = None
     if before is not None and before.today == today and (later := changed_machines(records, *before.head)) is not None:
-        other = {serial for serial, day in (artefacts.items() ^ before.artefacts.items())}
+        other = {serial for serial, _ in artefacts.items() ^ before.artefacts.items()}
         with_other = {one.serial for one in before.machines if one.due is not None and one.due.artefact in other}
         changed = later | with_other | unsettled_machines(records, today, lambda rule: Rule.of(rule).pooled)
         changed = changed if len(changed) <= MOST_ANEW else None
     newest, days = standing_of_all(records, changed), due(records, today, changed)
     found = [MachineStanding.of(one, days.get(one.machine.serial), today) for one in newest]
-    kept = [] if before is None or changed is None else [one for one in before.machines if one.serial not in changed]
-    machines = in_order([*kept, *found])
+    if before is None or changed is None:
+        machines = in_order(found)
+    else:
+        machines = [one for one in before.machines if one.serial not in changed]
+        for one in found:
+            insort(machines, one, key=_urgency)
     counts = Counter(group for one in machines for group in one.groups)
     places = {one.newest.machine.place for one in machines} - {""}
     return MachineOverview(head, today, machines, artefacts, counts, tuple(sorted(places)))
 
 
-def in_order(machines: Sequence[MachineStanding]) -> tuple[MachineStanding, ...]:
+def in_order(machines: Sequence[MachineStanding]) -> list[MachineStanding]:
     """The most urgent first, then by due date and serial."""
+    return sorted(machines, key=_urgency)
 
-    def urgency(one: MachineStanding) -> tuple[int, dt.date, str]:
-        due = one.due.due if one.due is not None and one.due.due is not None else dt.date.max
-        return _URGENCY[one.groups[0]], due, one.serial
 
-    return tuple(sorted(machines, key=urgency))
+def _urgency(one: MachineStanding) -> tuple[int, dt.date, str]:
+    due = one.due.due if one.due is not None and one.due.due is not None else dt.date.max
+    return _URGENCY[one.groups[0]], due, one.serial
 
 
 def groups(newest: Newest, due: DueItem | None, today: dt.date) -> tuple[str, ...]:

@@ -137,7 +137,10 @@ class RecordQueries:
         """Measured interim checks, neither withdrawn nor replaced, by day, then entry."""
         query = _CERTIFICATES.where(*measured(_C), _C.interim.is_(True))
         with self.reading() as connection:
-            found = [one for own in named(of) for one in self._certificates(connection, query.where(*own))]
+            each = (
+                query.where(*(_C.machine.in_(select(machines.c.id).where(one)) for one in own)) for own in named(of)
+            )
+            found = [one for own in each for one in self._certificates(connection, own)]
         return sorted(found, key=lambda one: (one.day, one.entry))
 
     def limited(self, entries: Sequence[int]) -> set[int]:
