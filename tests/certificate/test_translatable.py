@@ -51,7 +51,7 @@ def known_to(folder: Path) -> str:
         " ".join((name, *(p.name for p in effect.reported), *effect.columns)) for name, effect in every().items()
     ]
     decided = [one.name for standard in BUILT_IN.values() for one in standard.characteristics]
-    symbols = [*PARAMETRIC_ERRORS, "XY YZ ZX Fmax Fmin"]
+    symbols = [*(error.vdi for error in PARAMETRIC_ERRORS), "XY YZ ZX Fmax Fmin"]
     return "\n".join([*own, *effects, *READY, *decided, *symbols, *KEYS, NAME, SAMPLER])
 
 

@@ -103,7 +103,7 @@ def _not_read(result: Result) -> list[str]:
         read |= {f"{a}{how}{b}" for a in plane for b in plane for how in "tw"}
     square = artefact.points.columns.get(SQUARE, np.zeros(len(artefact.points)))
     read |= {f"{run.axis}w{str(run.quantity)[-1]}" for run in artefact.runs if square[artefact.rows[run.rows, 0]].any()}
-    return [error for error in PARAMETRIC_ERRORS if error not in read]
+    return [error.vdi for error in PARAMETRIC_ERRORS if error.vdi not in read]
 
 
 def sections(result: Result) -> list[Section]:

@@ -25,9 +25,84 @@ from cmm_uq.machine.physics.compensation import BLOCK, Compensation, PointCondit
 from cmm_uq.machine.physics.kinematics import MOST_LEAN, axis_directions, euler_313, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import LookedUp
 from cmm_uq.machine.physics.point_cloud import COORDINATES, DIGITIZER_COLUMNS
-from cmm_uq.maths.geometry import fit_sphere
+from cmm_uq.maths.geometry import fit_plane, fit_sphere
+from cmm_uq.maths.geometry.feature import frame_about, minimise
 
 LEANS = 0.01  # part of its radius by which a sphere that was scanned in several attitudes is none, where the axes lean
+
+
+@dataclass(frozen=True, eq=False)
+class ScanPlane:
+    """Direction of the scan plane: α, β in rad and their covariance (2, 2) in rad²."""
+
+    alpha: float
+    beta: float
+    covariance: Floats
+
+
+def scan_plane(readings: Floats, towards: Floats, *, u_point: float | None = None) -> ScanPlane:
+    """Euler angles α and β from discrete points of the scan plane (Harris 2004 eq. 6).
+
+    A fixed detector finds the plane; the scale readings at which the light falls on it span a plane parallel to it.
+
+    ``readings``: (n, 3) scale readings, n ≥ 3, mm. ``towards``: (3,) roughly the way w points, out of the digitizer's back:
+    three points do not tell it from its opposite. ``u_point``: standard uncertainty of a point along w, mm; needed for three
+    points, else estimated when left out.
+    """
+    if len(readings) == 3 and u_point is None:
+        problem = "three points leave nothing to estimate their uncertainty from"
+        raise CmmUqError(problem, fix="Give u_point, or more points")
+    plane = fit_plane(readings, u_point=u_point)
+    across = float(plane.normal @ towards / np.linalg.norm(towards))
+    if abs(across) < 0.1:
+        fix = "Give roughly the way the digitizer's back points"
+        raise CmmUqError("the direction of w lies in the scan plane", fix=fix)
+    w = plane.normal * np.sign(across)
+    level = w[0] ** 2 + w[1] ** 2
+    if level < 1e-12:
+        raise CmmUqError("w points along Z, so that α is not determined", fix="Use γ alone for this attitude")
+    to_angles = np.array([[-w[1] / level, w[0] / level, 0.0], [0.0, 0.0, -1 / np.sqrt(level)]])
+    alpha, beta = float(np.arctan2(w[0], -w[1])), float(np.arctan2(np.sqrt(level), w[2]))
+    return ScanPlane(alpha, beta, to_angles @ plane.covariance[3:, 3:] @ to_angles.T)
+
+
+def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float, nominal: float) -> float:
+    """Euler angle γ in rad from the scan of a plane surface: the angle with which its points lie in one plane.
+
+    ``scan``: (n, 2) u, v, mm. ``readings``: (n, 3) scale readings, mm. They must move in two directions, else γ and the
+    surface's slope are one. ``alpha, beta``: rad. ``nominal``: γ as the wrist is indexed, rad; moves in two directions leave
+    a second solution, half a turn away.
+    """
+
+    def placed(gamma: float) -> Floats:
+        return np.asarray(scan @ euler_313(alpha, beta, gamma)[:, :2].T + readings)
+
+    plane = fit_plane(placed(nominal), u_point=1.0)
+    size = float(np.abs(readings - readings.mean(axis=0)).max()) or 1.0
+
+    def linearise(state: Floats) -> Floats:
+        gamma, n, d = state[0], state[1:4] / np.linalg.norm(state[1:4]), state[4]
+        u, v, _ = euler_313(alpha, beta, gamma).T
+        points = placed(gamma) - plane.point
+        turned = scan[:, :1] * v - scan[:, 1:] * u
+        across = frame_about(n)[:2]
+        rows = [turned @ n, *(across @ points.T), np.full(len(points), -size), points @ n - d]
+        return np.array(rows) / size
+
+    def move(state: Floats, step: Floats) -> Floats:
+        n = state[1:4] / np.linalg.norm(state[1:4])
+        n = n + step[1:3] @ frame_about(n)[:2]
+        return np.array([state[0] + step[0], *(n / np.linalg.norm(n)), state[4] + size * step[3]])
+
+    found = minimise(np.array([nominal, *plane.normal, 0.0]), linearise, move, "roll of the scan plane")
+    if found.condition > 1e6:
+        fix = "Scan the plane while moving in two directions across it"
+        raise CmmUqError("these motions do not determine γ", fix=fix)
+    gamma = float(found.state[0])
+    if abs(gamma - nominal) > np.pi / 12:
+        problem = f"γ = {np.degrees(gamma):.2f}° from the scan, the wrist is indexed at {np.degrees(nominal):.2f}°"
+        raise CmmUqError(problem, fix="Check the index of the wrist, and that every point lies on the plane")
+    return gamma
 
 
 def mount_axes(rotation: Floats) -> tuple[Floats, Floats, Floats]:
@@ -119,6 +194,10 @@ class Alignment:
     def attitude(self) -> Floats:
         """(3, 3) columns u, v, w in machine axes."""
         return euler_313(self.alpha, self.beta, self.gamma)
+
+    def from_sphere(self, scan: Floats, readings: Floats) -> Floats:
+        """Coordinates (n, 3) relative to the reference sphere, as the digitizer reports them uncompensated (eq. 9, 14)."""
+        return np.asarray(scan @ self.attitude[:, :2].T + readings - self.reading)
 
 
 def align_on_sphere(

@@ -17,10 +17,11 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 from itertools import combinations, permutations
+from typing import Literal
 
 import numpy as np
 
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.values import dataclass
 
@@ -28,12 +29,67 @@ SQUARENESSES = ("xy", "yz", "zx")  # pairs of axes in the order in which every s
 MOST_LEAN = 0.175  # rad, 10°: farther out of square no axis of a machine is believed to be
 
 
+@dataclass(frozen=True)
+class ParametricError:
+    """One of the 21: a displacement along or a rotation about ``direction`` of ``carriage``, or a squareness.
+
+    Of a squareness, ``carriage`` and ``direction`` are the two axes as in :data:`SQUARENESSES`.
+    """
+
+    kind: Literal["displacement", "rotation", "squareness"]
+    carriage: str
+    direction: str
+
+    @property
+    def vdi(self) -> str:
+        """Name in VDI/VDE 2617: carriage, t, r or w, direction, such as ``xty``, ``xrz`` or ``xwy``."""
+        if self.kind == "squareness":
+            return "w".join(sorted((self.carriage, self.direction)))
+        return f"{self.carriage}{'t' if self.kind == 'displacement' else 'r'}{self.direction}"
+
+    @property
+    def symbol(self) -> str:
+        """Name in Greek: δ or ε with the direction, and the carriage in brackets; S with two axes."""
+        if self.kind == "squareness":
+            return f"S{self.carriage}{self.direction}"
+        return f"{'δ' if self.kind == 'displacement' else 'ε'}{self.direction}({self.carriage})"
+
+
+_KINDS: tuple[Literal["displacement", "rotation"], ...] = ("displacement", "rotation")
+
+# all 21 in the order of every Jacobian here: of carriages x, y, z the displacements and rotations, then squareness
 PARAMETRIC_ERRORS = (
-    *(f"{carriage}{kind}{direction}" for carriage in AXES for kind in "tr" for direction in AXES),
-    *("w".join(sorted(pair)) for pair in SQUARENESSES),
+    *(ParametricError(kind, a, b) for a in AXES for kind in _KINDS for b in AXES),
+    *(ParametricError("squareness", pair[0], pair[1]) for pair in SQUARENESSES),
 )
-"""Names in VDI/VDE 2617 of all 21, in the order of every Jacobian here: carriage, t of a displacement or r of a rotation,
-direction (``xty``, ``xrz``) of carriages x, y, z; then squarenesses, by w and both axes (``xwy``)."""
+
+_VDI = re.compile(r"([xyz])([trw])([xyz])")
+_GREEK = re.compile(r"(?:(δ|delta|d)|(ε|ϵ|epsilon|eps|e))_?([xyz])_?\(?([xyz])\)?")
+_SQUARE = re.compile(r"(?:s|squareness)_?([xyz])([xyz])")
+
+
+def parametric_error(name: str) -> ParametricError:
+    """The error that a name of VDI/VDE 2617 (``ytx``) or of the δ/ε notation (``δx(y)``, ``epsilon_z(x)``) means."""
+    text = name.strip().lower()
+    found = None
+    if match := _VDI.fullmatch(text):
+        a, kind, b = match.groups()
+        moved = ParametricError("displacement" if kind == "t" else "rotation", a, b)
+        found = _squareness(a, b) if kind == "w" else moved
+    elif match := _GREEK.fullmatch(text):
+        displaced, _, b, a = match.groups()
+        found = ParametricError("displacement" if displaced else "rotation", a, b)
+    elif match := _SQUARE.fullmatch(text):
+        found = _squareness(*match.groups())
+    if found is None:
+        known = [e.vdi for e in PARAMETRIC_ERRORS] + [e.symbol for e in PARAMETRIC_ERRORS]
+        raise CmmUqError(f"no parametric error is named {name!r}", fix=suggestion(text, known))
+    return found
+
+
+def _squareness(a: str, b: str) -> ParametricError | None:
+    pair = next((p for p in SQUARENESSES if set(p) == {a, b}), None)
+    return ParametricError("squareness", pair[0], pair[1]) if pair else None
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor, eff
 BLOCK = 10_000
 LARGEST = 20_000_000
 HIGHEST_COVERAGE = 0.9999  # of the adaptive procedure, whose blocks have 100/(1 − p) trials (JCGM 101 7.9.4 b).
-_FEWEST_BLOCKS = 10
+_FEWEST_BLOCKS, _BINS = 10, 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +55,8 @@ class Simulated:
     stable: bool | None  # all figures within their tolerance, rare draws included; None when no digits are asked for
     shape: Floats  # (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.coverage`).
     unseen: Floats  # (p,) by how much u would be larger with draws too rare to have come; may be infinite
+    edges: Floats  # (p, b + 1) of the histogram of the output, for pictures
+    density: Floats  # (p, b)
 
     @cached_property
     def u(self) -> Floats:
@@ -116,6 +118,12 @@ def simulate_adaptively(
     return run.result(stable)
 
 
+def draw_outputs(model: MeasurementModel, trials: int, seed: int = 0) -> Floats:
+    """Draws (p, trials) of the outputs themselves, for regions and pictures; memory grows with the trials."""
+    source, rng = _source(model), np.random.default_rng(seed)
+    return np.concatenate([source.draw(rng, min(BLOCK, trials - k)) for k in range(0, trials, BLOCK)], axis=1)
+
+
 def numerical_tolerance(u: Floats, digits: int) -> Floats:
     """Δ of JCGM 101 7.9.2: half a unit of the last of ``digits`` significant digits of u; zero for u = 0."""
     tolerance = np.zeros_like(np.asarray(u, dtype=np.float64))
@@ -167,6 +175,7 @@ class _Run:
         self._mean, self._comoment = np.zeros(p), np.zeros((p, p))
         self._tails = [Tails(coverage) for _ in range(p)]
         self._block_mean, self._block_squares = np.zeros((p, 6)), np.zeros((p, 6))
+        self._width, self._edges, self._counts = np.zeros(0), np.zeros((0, _BINS + 1)), np.zeros((p, _BINS))
 
     def advance(self, n: int) -> None:
         outputs = self.source.draw(self._rng, n)
@@ -188,8 +197,14 @@ class _Run:
                 step = figures - self._block_mean
                 self._block_mean = self._block_mean + step / self.blocks
                 self._block_squares = self._block_squares + step * (figures - self._block_mean)
-        for tails, draws in zip(self._tails, outputs, strict=True):
+        if not self._edges.size:  # the bins are laid about the first block
+            low, high = outputs[:, 0], outputs[:, -1]
+            extent = np.where(high > low, high - low, np.abs(low) + 1.0)
+            self._width = 1.2 * extent / _BINS
+            self._edges = (low - 0.1 * extent)[:, None] + self._width[:, None] * np.arange(_BINS + 1)
+        for row, (tails, draws) in enumerate(zip(self._tails, outputs, strict=True)):
             tails.add(draws)
+            self._counts[row] += np.diff(np.searchsorted(draws, self._edges[row]))
 
     def figures(self) -> Floats:
         """(p, 6) value and u of all trials, and the mean ends of the blocks' intervals."""
@@ -223,7 +238,9 @@ class _Run:
                 raise CmmUqError(f"the variance of {name} is beyond what floating-point numbers hold", fix=fix)
         covariance = self._comoment / (self.trials - 1)
         figures = self._mean, covariance, ends[:, :2], ends[:, 2:], self.standard_errors(), stable, *self.tails()
-        return Simulated(list(self.source.outputs), self.trials, self.coverage, self.seed, *figures)
+        density = self._counts / (self.trials * self._width[:, None])
+        outputs = list(self.source.outputs)
+        return Simulated(outputs, self.trials, self.coverage, self.seed, *figures, self._edges, density)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from cmm_uq.machine.physics.kinematics import (
     exact,
     first_order,
     jacobian,
+    parametric_error,
     rotate,
 )
 
@@ -107,7 +108,9 @@ def test_the_jacobian_is_the_derivative_of_the_exact_form(chain):
             exact(readings, np.tile(v[:18].reshape(3, 6), (6, 1, 1)), v[18:], tip=tip, chain=chain)
             for v in (values, -values)
         ]
-        np.testing.assert_allclose((pair[0] - pair[1]) / 2e-6, J[:, :, i], atol=1e-5, err_msg=PARAMETRIC_ERRORS[i])
+        np.testing.assert_allclose(
+            (pair[0] - pair[1]) / 2e-6, J[:, :, i], atol=1e-5, err_msg=PARAMETRIC_ERRORS[i].symbol
+        )
 
 
 def test_the_first_order_is_linear_with_that_jacobian():
@@ -143,10 +146,36 @@ def test_rotation_vectors_turn_as_those_of_scipy():
     assert rotate(np.zeros((1, 3)), np.ones((1, 3))).tolist() == [[1, 1, 1]]
 
 
-def test_errors_are_named_as_in_vdi_2617() -> None:
-    assert PARAMETRIC_ERRORS[:6] == ("xtx", "xty", "xtz", "xrx", "xry", "xrz")
-    assert PARAMETRIC_ERRORS[-3:] == ("xwy", "ywz", "xwz")
-    assert len(set(PARAMETRIC_ERRORS)) == 21
+@pytest.mark.parametrize(
+    ("name", "vdi", "symbol"),
+    [
+        ("xtx", "xtx", "δx(x)"),
+        ("ytx", "ytx", "δx(y)"),
+        ("δx(y)", "ytx", "δx(y)"),
+        ("delta_x(y)", "ytx", "δx(y)"),
+        ("xrz", "xrz", "εz(x)"),
+        ("epsilon_z(x)", "xrz", "εz(x)"),
+        ("εy(z)", "zry", "εy(z)"),
+        ("xwy", "xwy", "Sxy"),
+        ("Szx", "xwz", "Szx"),
+        ("squareness_yz", "ywz", "Syz"),
+    ],
+)
+def test_errors_go_by_their_vdi_and_their_greek_names(name, vdi, symbol):
+    error = parametric_error(name)
+    assert (error.vdi, error.symbol) == (vdi, symbol)
+
+
+def test_there_are_twenty_one_errors_each_found_by_both_names():
+    assert len({e.vdi for e in PARAMETRIC_ERRORS}) == 21
+    for error in PARAMETRIC_ERRORS:
+        assert parametric_error(error.vdi) == parametric_error(error.symbol) == error
+
+
+@pytest.mark.parametrize("name", ["xtw", "xwx", "axb", "scale", ""])
+def test_no_other_name_is_an_error(name):
+    with pytest.raises(CmmUqError, match="no parametric error is named"):
+        parametric_error(name)
 
 
 @pytest.mark.parametrize("chain", CHAINS)

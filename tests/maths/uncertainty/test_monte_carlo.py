@@ -109,6 +109,7 @@ def test_blocks_add_up_to_the_moments_of_all_trials() -> None:
     np.testing.assert_allclose(found.covariance, np.cov(draws), rtol=1e-9)
     ordered = np.sort(draws[1])
     assert ordered[0] <= found.interval[1, 0] < found.interval[1, 1] <= ordered[-1]
+    assert np.sum(found.density[1] * np.diff(found.edges[1])) == pytest.approx(1.0, abs=5e-3)
 
 
 def test_the_adaptive_procedure_stops_when_twice_the_error_is_below_the_tolerance() -> None:

@@ -1,17 +1,19 @@
-"""I++ DME (VDMA 8722): its lines, and a client: session, positions, reports and errors.
+"""I++ DME (VDMA 8722): its lines, and a client: session, positions, tools, temperatures, errors, and measuring.
 
 Lines are by the syntax of specification 1.4.3, section 6.1.4: terms such as ``X(12.5)``, and responses with tags and a sign:
 ``&`` accepts a command, ``#`` brings data, ``!`` an error, ``%`` ends the transaction. Transactions follow one after the
-other, each to the end of its answer. No command of the client moves the machine.
+other, each to the end of its answer. No command moves the machine unless its caller allowed it and confirms each
+(:class:`Client`, ``confirm``).
 """
 
 from __future__ import annotations
 
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import count
 
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.values import dataclass
 from cmm_uq.laboratory.live.instruments.parsing import Framer
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame
@@ -175,21 +177,26 @@ class HeardLine:
     monotonic_ns: int
 
 
-ANSWER_WITHIN_S = 2.0  # time for the acknowledgement, and for data
+ANSWER_WITHIN_S = 2.0  # time for the acknowledgement, and for data of what does not move the machine
+MOVED_WITHIN_S = 300.0  # time for what moves it
 NOT_THERE = frozenset({501, 502, 505, 506, 507, 509, 510})
 """Errors by which a server says that it does not know a command, an argument or a property (section 8.2)."""
 
 _KEPT = 1000  # lines sent that are remembered
+Position = tuple[float, float, float]
 
 
 class Client:
     """A client of one server.
 
+    ``confirm``: asked before each command that moves the machine, with the command; ``None``: nothing ever moves;
     ``unasked``: lines that answer no command: events, reports of daemons, errors by themselves, and what is no response.
     """
 
-    def __init__(self, port: Port, clock: Clock, *, within_s: float = ANSWER_WITHIN_S) -> None:
-        self._port, self._clock, self.within_s = port, clock, within_s
+    def __init__(
+        self, port: Port, clock: Clock, *, confirm: Callable[[str], bool] | None = None, within_s: float = ANSWER_WITHIN_S
+    ) -> None:  # fmt: skip
+        self._port, self._clock, self._confirm, self.within_s = port, clock, confirm, within_s
         self._framer = Framer(MessageFrame(terminator="<CR><LF>", longest=LONGEST))
         self._commands, self._events = count(), count()
         self._came: deque[HeardLine] = deque()
@@ -276,6 +283,11 @@ class Client:
         """Let the server go on after an error."""
         self.call("ClearAllErrors()")
 
+    def abort(self) -> None:
+        """Stop all motion as soon as possible, and let the server go on."""
+        self.call("AbortE()", event=True)
+        self.clear_all_errors()
+
     def get(self, *names: str) -> HeardLine:
         """Ask for what the names say now, ``X``, ``Y``, ``Z`` where none is given."""
         (answer,) = self.call(f"Get({_empty(names or 'XYZ')})")
@@ -286,16 +298,66 @@ class Client:
         self.call(f"OnPtMeasReport({_empty(names)})")
 
     def on_move_report(self, time_s: float, distance_mm: float, *names: str) -> str:
-        """Have positions reported while the machine moves; the tag of the reports, which end with the session."""
+        """Have positions reported while the machine moves; the tag of the reports, by which :meth:`stop_daemon` ends them."""
         spaced = f"Time({number_text(max(time_s, 0.1))}), Dis({number_text(distance_mm)})"
         self.call(f"OnMoveReportE({spaced}, {_empty(names)})", event=True)
         return self.sent[-1].partition(" ")[0]
+
+    def stop_daemon(self, tag: str) -> None:
+        self.call(f"StopDaemon({tag})")
 
     def enable_user(self) -> None:
         """Let the user move the machine and pick points by the joystick."""
         self.call("EnableUser()")
 
-    def _known(self, command: str, name: str) -> str | None:
+    def tools(self) -> list[str]:
+        return [str(arguments_of(_rest(answer))[0]) for answer in self.call("EnumTools()")]
+
+    def tool(self) -> str:
+        (answer,) = self.call("GetProp(Tool.Name())")
+        return str(_first(answer, "Tool.Name"))
+
+    def find_tool(self, name: str) -> None:
+        """Look for a tool; error 1502 where there is none of this name."""
+        self.call(f"FindTool({_quoted(name)})")
+
+    def part_temperature(self) -> float | None:
+        """Temperature of the part, °C, as section 9.6 of 1.4.3 announces it; ``None`` where the server has none."""
+        celsius = self._known("GetProp(Part.Temperature())", "Part.Temperature")
+        return None if celsius is None else float(celsius)
+
+    def scale_temperatures(self) -> dict[str, float]:
+        """Temperatures of the scales by axis, °C, as servers of VDMA 8722 (2.5) give them; empty where the server has none."""
+        answer = self._unless_unknown("GetScaleTemperatures(X(), Y(), Z())")
+        try:
+            found = terms_of(_rest(answer)) if answer is not None else {}
+        except BadLineError as error:
+            raise NoAnswerError(str(error)) from None
+        return {axis: value[0] for axis, value in found.items() if value and isinstance(value[0], float)}
+
+    def pt_meas(self, position: Position, normal: Position | None = None) -> HeardLine:
+        """Measure a point, mm: the machine moves; without an outward normal in the direction from the last position."""
+        towards = f", IJK({', '.join(map(number_text, normal))})" if normal else ""
+        (answer,) = self._moving(f"PtMeas({_place(position)}{towards})")
+        return answer
+
+    def go_to(self, position: Position) -> None:
+        """Move there; see :meth:`pt_meas`."""
+        self._moving(f"GoTo({_place(position)})")
+
+    def change_tool(self, name: str) -> None:
+        """Change the tool: the machine may move; see :meth:`pt_meas`."""
+        self._moving(f"ChangeTool({_quoted(name)})")
+
+    def _moving(self, command: str) -> list[HeardLine]:
+        if self._confirm is None:
+            fix = "Allow it and confirm each move"
+            raise CmmUqError(f"{command} moves the machine, which was not allowed", fix=fix)
+        if not self._confirm(command):
+            raise CmmUqError(f"{command} was not confirmed: the machine was not moved")
+        return self.call(command, within_s=MOVED_WITHIN_S)
+
+    def _unless_unknown(self, command: str) -> HeardLine | None:
         """Answer to what older servers may not know; ``None`` where this one does not, and goes on."""
         try:
             (answer,) = self.call(command)
@@ -304,11 +366,24 @@ class Client:
                 raise
             self.clear_all_errors()
             return None
-        return str(_first(answer, name))
+        return answer
+
+    def _known(self, command: str, name: str) -> str | None:
+        return None if (answer := self._unless_unknown(command)) is None else str(_first(answer, name))
 
 
 def _empty(names: Sequence[str]) -> str:
     return ", ".join(f"{name}()" for name in names)
+
+
+def _place(position: Position) -> str:
+    return ", ".join(f"{axis}({number_text(value)})" for axis, value in zip("XYZ", position, strict=True))
+
+
+def _quoted(name: str) -> str:
+    if not name or any(not 32 <= ord(c) <= 126 or c == '"' for c in name):
+        raise CmmUqError(f"{name!r} can be no name of a tool", fix="Name it in ASCII, without quotes")
+    return f'"{name}"'
 
 
 def _rest(heard: HeardLine) -> str:

@@ -6,6 +6,7 @@ It follows the sections of the specification that its methods name. It is for tr
 from __future__ import annotations
 
 import contextlib
+import math
 import select
 import socket
 import threading
@@ -17,13 +18,18 @@ from cmm_uq.laboratory.live.instruments.parsing import Framer
 from cmm_uq.laboratory.live.instruments.profile import MessageFrame
 
 TEXTS = {
-    1: (2, "Illegal tag"), 8: (3, "Protocol error"), 500: (3, "Emergency stop"), 501: (3, "Unsupported command"),
-    510: (3, "Bad property"), 514: (2, "Use ClearAllErrors to continue"), 515: (2, "Daemon already exists"),
+    1: (2, "Illegal tag"), 6: (2, "Transaction aborted (Use ClearAllErrors To Continue)"), 7: (3, "Illegal character"),
+    8: (3, "Protocol error"), 500: (3, "Emergency stop"), 501: (3, "Unsupported command"), 502: (3, "Incorrect arguments"),
+    509: (3, "Bad argument"), 510: (3, "Bad property"), 511: (3, "Error processing method"), 512: (1, "No daemons are active"),
+    513: (2, "Daemon does not exist"), 514: (2, "Use ClearAllErrors to continue"), 515: (2, "Daemon already exists"),
+    1006: (2, "Surface not found"), 1502: (3, "Tool not found"), 1503: (3, "Tool not defined"),
+    2500: (3, "Machine limit encountered [Move Out Of Limits]"),
 }  # fmt: skip
 """Severity and text of errors by their numbers (section 8.2)."""
 
 _TICK_S = 0.02
-_IN_ERROR_TOO = ("ClearAllErrors", "GetErrStatusE", "EndSession", "StartSession")
+_IN_ERROR_TOO = ("ClearAllErrors", "GetErrStatusE", "GetXtdErrStatus", "AbortE", "EndSession", "StartSession")
+LIMIT_MM = 1000.0  # of each axis, both ways
 
 
 @dataclass
@@ -31,6 +37,9 @@ class SimulatedState:
     """Of the machine; kept from session to session (section 6.3.1.2)."""
 
     position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    tool: str = "RefTool"
+    found: str = "UnDefTool"
+    homed: bool = False
     user: bool = False
     session: bool = False
     error: bool = False
@@ -38,10 +47,17 @@ class SimulatedState:
     daemons: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-_SETTINGS = {"clearallerrors": ("error", False), "enableuser": ("user", True)}
+_SETTINGS = {
+    "clearallerrors": ("error", False), "aborte": ("error", True), "enableuser": ("user", True),
+    "disableuser": ("user", False),
+}  # fmt: skip
 """Methods that only set something of the state."""
 
-_SAYINGS = {"getmachineclass": "GetMachineClass(CartCMM)", "geterrstatuse": "ErrStatus({0.error:d})"}
+_SAYINGS = {
+    "getmachineclass": ("GetMachineClass(CartCMM)",), "geterrstatuse": ("ErrStatus({0.error:d})",),
+    "getxtderrstatus": ("IsHomed({0.homed:d})", "IsUserEnabled({0.user:d})"), "ishomed": ("IsHomed({0.homed:d})",),
+    "isuserenabled": ("IsUserEnabled({0.user:d})",),
+}  # fmt: skip
 """Methods that only say something of it."""
 
 
@@ -50,14 +66,17 @@ class MethodError(Exception):
 
 
 class SimulatedIppServer:
-    """A CMM behind a server, listening at a free port until it is closed.
+    """A CMM behind a server, listening at a port (0: a free one) until it is closed.
 
     Each method that does more than set or say something gives its data, and is named ``_do_`` and its name in small letters.
     """
 
-    def __init__(self, *, version: str | None = "1.4.3") -> None:
-        self.state, self.port = SimulatedState(), 0
-        self.version = version  # ``None``: it does not know the question
+    tools = ("RefTool", "NoTool", "Probe1", "Probe2")
+
+    def __init__(self, tcp_port: int = 0, *, part_c: float | None = 20.13, version: str | None = "1.4.3") -> None:
+        self.state, self.port = SimulatedState(), tcp_port
+        self.part_c, self.version = part_c, version  # ``None``: it does not know the property, the question
+        self.radial = 0.0  # how far the surface lies from where it is expected, along the normal, mm
         self.lines: list[str] = []  # all that was said, by both sides, with > and <
         self._sending = threading.Lock()
         self._connection: socket.socket | None = None
@@ -80,13 +99,7 @@ class SimulatedIppServer:
     def pick(self, x: float, y: float, z: float) -> None:
         """The user picks a point by hand (section 9.5.3)."""
         self.state.position = [x, y, z]
-        self._send(f"E0000 # PtMeas({self.reported(self.state.report)})")
-
-    def move(self, x: float, y: float, z: float) -> None:
-        """The user moves the machine by the joystick, and daemons report it."""
-        self.state.position = [x, y, z]
-        for tag, names in self.state.daemons.items():
-            self._send(f"{tag} # {self.reported(names)}")
+        self._send(f"E0000 # PtMeas({self.reported(self.state.report, (0, 0, 1))})")
 
     # --- the connection -----------------------------------------------------------------------------------------------------
 
@@ -148,12 +161,13 @@ class SimulatedIppServer:
                 raise MethodError(8)
             if state.error and method.name not in _IN_ERROR_TOO:
                 raise MethodError(514)
-            act: Callable[[str, ipp.Term], str | None] | None = getattr(self, f"_do_{name}", None)
+            act: Callable[[str, ipp.Term], list[str] | None] | None = getattr(self, f"_do_{name}", None)
             if name in _SETTINGS:
                 setattr(state, *_SETTINGS[name])
             elif act is None and name not in _SAYINGS:
                 raise MethodError(501)
-            if line := act(tag, method) if act else _SAYINGS.get(name, "").format(state):
+            data = act(tag, method) if act else [saying.format(state) for saying in _SAYINGS.get(name, ())]
+            for line in data or ():
                 self._send(f"{tag} # {line}")
         except MethodError as error:
             number = int(error.args[0])
@@ -171,32 +185,106 @@ class SimulatedIppServer:
         self.state.session = False
         self.state.daemons.clear()
 
-    def _do_getdmeversion(self, tag: str, method: ipp.Term) -> str:
+    def _do_getdmeversion(self, tag: str, method: ipp.Term) -> list[str]:
         if self.version is None:
             raise MethodError(501)
-        return f'DMEVersion("{self.version}")'
+        return [f'DMEVersion("{self.version}")']
 
-    def _do_get(self, tag: str, method: ipp.Term) -> str:
-        return self.reported(_names(method))
+    def _do_home(self, tag: str, method: ipp.Term) -> None:
+        self.state.homed, self.state.position, self.state.user = True, [0.0, 0.0, 0.0], False
+
+    def _do_get(self, tag: str, method: ipp.Term) -> list[str]:
+        return [self.reported(_names(method.arguments, ("X", "Y", "Z", "Tool.A", "Tool.B", "Tool.C")))]
 
     def _do_onptmeasreport(self, tag: str, method: ipp.Term) -> None:
-        self.state.report = _names(method)
+        self.state.report = _names(method.arguments, ("X", "Y", "Z", "IJK", "ER", "Q", "Tool.A", "Tool.B", "Tool.C"))
 
     def _do_onmovereporte(self, tag: str, method: ipp.Term) -> None:
         if self.state.daemons:
             raise MethodError(515)
-        self.state.daemons[tag] = _names(method, besides=("Time", "Dis"))
+        rest = [one for one in method.arguments if not (isinstance(one, ipp.Term) and one.name in ("Time", "Dis"))]
+        self.state.daemons[tag] = _names(tuple(rest), ("X", "Y", "Z"))
 
-    def reported(self, names: tuple[str, ...]) -> str:
-        return ", ".join(f"{axis}({self.state.position['XYZ'.index(axis)]:.4f})" for axis in names)
+    def _do_stopdaemon(self, tag: str, method: ipp.Term) -> None:
+        if len(method.arguments) != 1 or self.state.daemons.pop(str(method.arguments[0]), None) is None:
+            raise MethodError(513)
+
+    def _do_stopalldaemons(self, tag: str, method: ipp.Term) -> None:
+        if not self.state.daemons:
+            raise MethodError(512)
+        self.state.daemons.clear()
+
+    def _do_goto(self, tag: str, method: ipp.Term) -> None:
+        self._move(_target(method, self.state.position)[0])
+
+    def _do_ptmeas(self, tag: str, method: ipp.Term) -> list[str]:
+        place, normal = _target(method, self.state.position)
+        size = math.hypot(*normal) or 1.0
+        unit = (normal[0] / size, normal[1] / size, normal[2] / size)
+        self._move([at + self.radial * n for at, n in zip(place, unit, strict=True)])
+        return [self.reported(self.state.report, unit)]
+
+    def _do_enumtools(self, tag: str, method: ipp.Term) -> list[str]:
+        return [f'"{name}"' for name in self.tools]
+
+    def _do_findtool(self, tag: str, method: ipp.Term) -> None:
+        self.state.found = self._tool(method)
+
+    def _do_changetool(self, tag: str, method: ipp.Term) -> None:
+        self.state.tool, self.state.user = self._tool(method), False
+
+    def _do_settool(self, tag: str, method: ipp.Term) -> None:
+        self.state.tool = self._tool(method)
+
+    def _do_getprop(self, tag: str, method: ipp.Term) -> list[str]:
+        known = {"Tool.Name": f'"{self.state.tool}"', "FoundTool.Name": f'"{self.state.found}"'}
+        if self.part_c is not None:
+            known["Part.Temperature"] = ipp.number_text(self.part_c)
+        names = [one.name if isinstance(one, ipp.Term) else "" for one in method.arguments]
+        if not set(names) <= set(known):
+            raise MethodError(510)
+        return [", ".join(f"{name}({known[name]})" for name in names)]
+
+    def _tool(self, method: ipp.Term) -> str:
+        if len(method.arguments) != 1 or method.arguments[0] not in self.tools:
+            raise MethodError(1502)
+        return str(method.arguments[0])
+
+    def _move(self, place: list[float]) -> None:
+        if any(abs(value) > LIMIT_MM for value in place):
+            raise MethodError(2500)
+        self.state.position, self.state.user = place, False
+        for tag, names in self.state.daemons.items():
+            self._send(f"{tag} # {self.reported(names)}")
+
+    def reported(self, names: tuple[str, ...], normal: tuple[float, float, float] = (0, 0, 1)) -> str:
+        """What a report says of the names, with the direction of a measured point."""
+        places = {axis: f"{value:.4f}" for axis, value in zip("XYZ", self.state.position, strict=True)}
+        further = {"IJK": ", ".join(map(ipp.number_text, normal)), "ER": "1.0", "Q": "0"}
+        return ", ".join(f"{name}({places.get(name) or further.get(name) or '0'})" for name in names)
 
 
-def _names(method: ipp.Term, besides: tuple[str, ...] = ()) -> tuple[str, ...]:
-    terms = [one for one in method.arguments if isinstance(one, ipp.Term)]
-    names = tuple(one.name for one in terms if not one.arguments)
-    if not names or not {one.name for one in terms} <= {"X", "Y", "Z", *besides} or len(terms) < len(method.arguments):
+def _names(arguments: tuple[ipp.Argument, ...], known: tuple[str, ...]) -> tuple[str, ...]:
+    names = tuple(one.name for one in arguments if isinstance(one, ipp.Term) and not one.arguments)
+    if not names or len(names) != len(arguments) or not set(names) <= set(known):
         raise MethodError(510)
     return names
+
+
+def _target(method: ipp.Term, position: list[float]) -> tuple[list[float], tuple[float, float, float]]:
+    """Where a command goes, axes that it does not name staying, and the direction that it names."""
+    place, normal = list(position), (0.0, 0.0, 1.0)
+    for one in method.arguments:
+        if not isinstance(one, ipp.Term) or not all(isinstance(value, float) for value in one.arguments):
+            raise MethodError(509)
+        numbers = [value for value in one.arguments if isinstance(value, float)]
+        if one.name in ("X", "Y", "Z") and len(numbers) == 1:
+            place["XYZ".index(one.name)] = numbers[0]
+        elif one.name == "IJK" and len(numbers) == 3:
+            normal = (numbers[0], numbers[1], numbers[2])
+        else:
+            raise MethodError(509)
+    return place, normal
 
 
 def fault(number: int, cause: str) -> str:

@@ -117,9 +117,9 @@ def test_a_number_as_it_is_sent_is_one_of_the_syntax_and_exact_to_a_picometre(va
 
 
 @contextmanager
-def session(machine: UnreliableIppServer, *, begin: bool = True) -> Iterator[Client]:
+def session(machine: UnreliableIppServer, *, drive: bool = True, begin: bool = True) -> Iterator[Client]:
     port = TcpPort("127.0.0.1", machine.port, machine.url)
-    client = Client(port, SYSTEM)
+    client = Client(port, SYSTEM, confirm=(lambda command: True) if drive else None)
     try:
         if begin:
             client.start_session()
@@ -138,17 +138,50 @@ def machine() -> Iterator[UnreliableIppServer]:
 def test_a_session_from_beginning_to_end(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         assert (client.version(), client.machine_class(), client.in_error()) == ("1.4.3", "CartCMM", False)
+        assert client.tools() == ["RefTool", "NoTool", "Probe1", "Probe2"]
+        client.change_tool("Probe1")
+        assert client.tool() == "Probe1"
+        assert client.part_temperature() == 20.13
         client.end_session()
         with pytest.raises(FaultError, match="Protocol error"):
             client.get()
 
 
+def test_a_point_is_measured_where_the_surface_is(machine: UnreliableIppServer) -> None:
+    """The surface lies 0.05 mm outside the nominal one along (3, 0, 4)/5: contact at nominal + 0.05·n."""
+    machine.radial = 0.05
+    with session(machine) as client:
+        client.on_pt_meas_report("X", "Y", "Z", "IJK")
+        heard = client.pt_meas((10, 20, 30), (3, 0, 4))
+        assert heard.response is not None
+        found = terms_of(heard.response.rest)
+        assert [found[axis][0] for axis in "XYZ"] == pytest.approx([10.03, 20.0, 30.04], abs=1e-4)
+        assert found["IJK"] == pytest.approx((0.6, 0.0, 0.8))
+
+
+@pytest.mark.parametrize("move", [
+    lambda client: client.pt_meas((0, 0, 0)),
+    lambda client: client.go_to((0, 0, 0)),
+    lambda client: client.change_tool("Probe1"),
+])  # fmt: skip
+def test_nothing_moves_unless_it_was_allowed_and_confirmed(move, machine: UnreliableIppServer) -> None:
+    with session(machine, drive=False) as client:
+        with pytest.raises(CmmUqError, match="moves the machine, which was not allowed"):
+            move(client)
+        asked: list[str] = []
+        client._confirm = lambda command: bool(asked.append(command))
+        with pytest.raises(CmmUqError, match="was not confirmed"):
+            move(client)
+    assert len(asked) == 1
+    assert not [line for line in machine.lines if "PtMeas(" in line or "GoTo" in line or "ChangeTool" in line]
+
+
 def test_an_error_stops_the_server_until_it_is_cleared(machine: UnreliableIppServer) -> None:
-    """Section 6.2.5, with 0501 and 0514 of 8.2."""
+    """Section 6.2.5, with 2500 and 0514 of 8.2."""
     with session(machine) as client:
         with pytest.raises(FaultError) as error:
-            client.call("Home()")
-        assert error.value.fault.number == 501
+            client.go_to((5000, 0, 0))
+        assert error.value.fault.number == 2500
         assert client.in_error()
         with pytest.raises(FaultError) as error:
             client.get()
@@ -160,18 +193,20 @@ def test_an_error_stops_the_server_until_it_is_cleared(machine: UnreliableIppSer
 def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: UnreliableIppServer) -> None:
     with session(machine) as client:
         tag = client.on_move_report(0.1, 1.0, "X")
-        machine.move(7, 0, 0)
-        client.get()
+        client.go_to((7, 0, 0))
         assert [heard.raw for heard in client.unasked] == [f"{tag} # X(7.0000)\r\n".encode()]
-        with pytest.raises(FaultError, match="Daemon already exists"):
-            client.on_move_report(0.1, 1.0, "X")
+        client.stop_daemon(tag)
+        with pytest.raises(FaultError, match="Daemon does not exist"):
+            client.stop_daemon(tag)
 
 
 def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
-    machine = UnreliableIppServer(version=None)
+    machine = UnreliableIppServer(version=None, part_c=None)
     try:
         with session(machine) as client:
             assert client.version() is None
+            assert client.part_temperature() is None
+            assert client.scale_temperatures() == {}
             client.get()
     finally:
         machine.close()
@@ -218,6 +253,11 @@ def test_a_connection_that_is_cut_is_lost(machine: UnreliableIppServer) -> None:
         with pytest.raises(PortLostError):
             client.get()
         machine.start()
+
+
+def test_a_name_that_would_break_the_line_is_refused(machine: UnreliableIppServer) -> None:
+    with session(machine) as client, pytest.raises(CmmUqError, match="can be no name of a tool"):
+        client.change_tool('a") %')
 
 
 def declared(machine: UnreliableIppServer, profile: str = "ipp") -> DeclaredSource:
