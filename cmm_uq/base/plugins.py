@@ -80,15 +80,16 @@ Of = TypeVar("Of", bound=Plugin)
 
 def offered(group: str, of: type[Of]) -> tuple[Of, ...]:
     """What the installed packages offer in a group, by name; nothing is imported."""
-    entries: list[EntryPoint] = [*_installed(tuple(sys.path)).select(group=group)]
-    entries.sort(key=lambda entry: (entry.name, entry.value))
+    entries = [entry for entry in _installed(tuple(sys.path)) if entry.group == group]
     return tuple(of(*((e.dist.name, e.dist.version) if e.dist else (e.module, "")), e) for e in entries)
 
 
 # What is installed follows from where packages are looked for, so that is the key; looking takes a hundredth of a second.
 @lru_cache(maxsize=3)
-def _installed(path: tuple[str, ...]) -> Any:
-    return entry_points()
+def _installed(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    every = entry_points()
+    own: list[EntryPoint] = [entry for group in WHAT for entry in every.select(group=group)]
+    return tuple(sorted(own, key=lambda entry: (entry.name, entry.value)))
 
 
 def named(plugins: Iterable[Of], name: str) -> Of | None:

@@ -189,7 +189,7 @@ class Desk(DeskFolder):
         request.only(("draft",))
         one = self.drafts.read(request.text("draft"))
         found = self.reader.ask("read", path=one.export, keys=one.keys)
-        kinds = self.reader.ask("kinds")
+        kinds = self.reader.ask("kinds", export=one.export, keys=one.keys)
         return page("desk/artefact.html", DESK, draft=one, kinds=kinds, amounts=found["amounts"])
 
     def fields(self, request: WebRequest) -> WebPage:

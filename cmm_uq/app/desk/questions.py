@@ -76,13 +76,6 @@ _OF_CERTIFICATE = {
 _PAIRS = ("machine.travel_mm.x", "machine.travel_mm.y", "machine.travel_mm.z", "rated_conditions.temperature_c")
 
 
-def kinds() -> list[list[str]]:
-    """Names of kinds that an export can be a recording of, what they measure, and what a set-up and its points are."""
-    kind = {name: kind_or_refused(one) for name, one in known().items()}
-    begun = {name: one.beginning(name) for name, one in kind.items() if one.table.with_recording}
-    return [[name, one.measured or one.title, one.numbering] for name, one in begun.items()]
-
-
 def _wanted(name: str) -> Iterator[tuple[str, Any]]:
     """Dotted keys with the example of each."""
     begun = usual(name)

@@ -12,10 +12,12 @@ import contextlib
 import json
 import os
 import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Mapping
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TextIO
 
 import numpy as np
@@ -24,7 +26,8 @@ import tomlkit
 from cmm_uq.analysis.diagnosis.location import residual_field
 from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.app.commands.files import Written
-from cmm_uq.app.commands.jobs.new import check_empty, job_id, put_new
+from cmm_uq.app.commands.jobs.exchange import read_export, write_recording
+from cmm_uq.app.commands.jobs.new import check_empty, job_id, kind_or_refused, known, put_new
 from cmm_uq.app.commands.parts.new import PART, Answers, certificate_files, part_of_drawing
 from cmm_uq.app.commands.parts.part import PartOptions, write_part
 from cmm_uq.app.commands.reading import read_job
@@ -136,6 +139,36 @@ def verification(path: str) -> dict[str, Any]:
     }
 
 
+_SMALL = 1_000_000  # bytes of an export that every kind is tried with
+
+
+def kinds(export: str = "", keys: Mapping[str, Any] = MappingProxyType({})) -> list[list[Any]]:
+    """Kinds that an export may be a recording of: name, what it measures, what a set-up is, how it fits, and what does not.
+
+    What does not is what ``cmm-uq check`` finds wrong with the readings of such a job. First come kinds with which nothing is
+    wrong, then those that wait for what the export does not hold, and those with other readings last: 0, 1 and 2.
+    """
+    kind = {name: kind_or_refused(one) for name, one in known().items()}
+    begun = {name: one.beginning(name) for name, one in kind.items() if one.table.with_recording}
+    fits = dict.fromkeys(begun, (0, ""))
+    if export and Path(export).stat().st_size <= _SMALL:
+        with tempfile.TemporaryDirectory(prefix="cmm-uq-") as place:
+            own = Path(place, "readings.csv")
+            write_recording(Path(export), read_export(Path(export), exports.keys_of(keys)), own)
+            fits = {name: _fit(name, own) for name in begun}
+    found = [[name, one.measured or one.title, one.numbering, *fits[name]] for name, one in begun.items()]
+    return sorted(found, key=lambda one: int(one[3]))
+
+
+def _fit(kind: str, own: Path) -> tuple[int, str]:
+    problems = questions.check_answers(kind, str(own), {}, {"machine.name": "?", "job.date": "2000-01-01"})["problems"]
+    about = [
+        words.partition(". ")[0] for where, _, words in (one.partition(": ") for one in problems) if own.name in where
+    ]
+    lacks = not about or "no column 'reference_" in about[0]  # the calibration of the artefact, or keys of the job
+    return (0 if not problems else 1 if lacks else 2), about[0] if about else ""
+
+
 def machine(job: str) -> str:
     """The picture of a job's machine, as SVG."""
     return machine_plot(read_job(Path(job), recorded=False).points.machine).svg
@@ -146,7 +179,7 @@ DOES: Mapping[str, Callable[..., Any]] = {
     "read": exports.read,
     "corrected": exports.corrected,
     "remembered": exports.remembered,
-    "kinds": questions.kinds,
+    "kinds": kinds,
     "fields": questions.fields_for,
     "check_answers": questions.check_answers,
     "check": questions.check_text,

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.desk.questions import _wanted, check_answers, check_text, create, fields, kinds, tables_of
+from cmm_uq.app.desk.questions import _wanted, check_answers, check_text, create, fields, tables_of
+from cmm_uq.app.desk.work import kinds
 from cmm_uq.artefacts import names
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.look import template_folder
@@ -140,6 +141,21 @@ def test_a_problem_says_where_on_the_desk_it_is_mended(tmp_path: Path, monkeypat
 
 
 def test_the_artefact_is_said_of_any_recording() -> None:
-    told = {name: (text, numbering) for name, text, numbering in kinds()}
+    told = {name: (text, numbering) for name, text, numbering, *_ in kinds()}
     assert told["step_gauge"][0] == "Step gauge or ball beam: points on a line"
     assert all(text and "measurement" in numbering for text, numbering in told.values())
+
+
+def test_kinds_that_fit_an_export_come_first_and_of_others_it_is_said_why(tmp_path: Path) -> None:
+    lengths = tmp_path / "lengths.csv"
+    rows = [f"{line};{at};{at}.001;{at}.002" for line in "AB" for at in (50, 150, 400, 600, 800)]
+    lengths.write_text("\n".join(["Position;Nominal [mm];Actual 1 [mm];Actual 2 [mm]", *rows]), encoding="utf-8")
+    placed = {"lines": {"A": "along X from 0,1,2", "B": "along Y from 0,1,2"}}
+    for export, keys, fit, other, why in (
+        (str(EXPORT), {}, ["ballbar"], "sphere", "2 points are too few for a centre and a distance"),
+        (str(lengths), placed, ["step_gauge", "arm_lengths", "gauge_blocks"], "ballbar", "points miss the artefact"),
+    ):
+        found = kinds(export, keys)
+        assert [name for name, _, _, rank, _ in found if rank == 0] == [one[0] for one in found[: len(fit)]] == fit
+        assert why in {name: words for name, _, _, rank, words in found if rank == 2}[other]
+        assert {name for name, _, _, rank, _ in found if rank == 1} >= {"plate", "triangle"}
