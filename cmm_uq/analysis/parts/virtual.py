@@ -37,7 +37,7 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.values import dataclass, field, replace
 from cmm_uq.machine.model.field import family_of
-from cmm_uq.maths.uncertainty.propagation import Source
+from cmm_uq.maths.uncertainty.propagation import Simulated, Source, simulate_adaptively
 
 FEWEST = 100_000  # virtual measurements, after which u is known to a quarter of a percent
 CHECKED = 200  # draws that are looked at exactly, beside first order
@@ -344,6 +344,10 @@ class Virtual:
     def source(self) -> Source:
         """The errors as outputs of a Monte Carlo."""
         return Source(self.names, lambda random, n: np.ascontiguousarray(self.errors(random, n).T))
+
+    def settled(self, coverage: float = 0.95, digits: int = 2, seed: int = 0) -> Simulated:
+        """As many as the digits of u that are asked for need (JCGM 101, 7.9), a hundred thousand at least."""
+        return simulate_adaptively(self.source, coverage, digits, seed, fewest_trials=FEWEST)
 
 
 _DRAWS = 4000
