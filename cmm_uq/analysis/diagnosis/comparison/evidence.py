@@ -351,9 +351,8 @@ class CandidateComparison:
         return kept[key]
 
     def _weigh(self, data: Floats | None, conditions: Sequence[Version]) -> ConditionedData:
-        own = data is None
         plain, weighed = (self.left[:, None], self._left_weighed) if data is None else (data, self._by_noise(data))
-        return self._given.beside(conditions, plain, weighed, self._logs, own=own)
+        return self._given.beside(conditions, plain, weighed, self._logs, own=data is None)
 
     @cached_property
     def _given(self) -> Conditioning:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 
 import numpy as np
 import scipy
@@ -78,9 +79,7 @@ def known_effects(model: RecordingModel, values: Floats, named: tuple[str, ...])
     own = (points.xyz[points.measurement == m] for m in np.unique(points.measurement))
     reach = max(float(np.ptp(xyz, axis=0).max()) for xyz in own)
     for effect in possible_effects(model.artefact):
-        if effect.name in named or not effect.shown_in(points):
-            continue
-        if any(column not in points.columns for column in effect.columns):
+        if effect.name in named or not effect.shown_in(points) or not points.columns.keys() >= set(effect.columns):
             continue
         try:
             tried = ((shape, _seen(model, effect, points, shape, values)) for shape in shapes(effect, points))
@@ -91,10 +90,8 @@ def known_effects(model: RecordingModel, values: Floats, named: tuple[str, ...])
             continue
         if any(np.any(member.columns) for member in members):
             if effect.mostly < 1:
-                members = (
-                    *(replace(m, columns=effect.mostly * m.columns) for m in members),
-                    *(replace(m, weight=_BEYOND) for m in members),
-                )
+                usual = [replace(m, columns=effect.mostly * m.columns) for m in members]
+                members = (*usual, *(replace(m, weight=_BEYOND) for m in members))
             members = (*members, *_roughly(model, effect, points, values))
             together = effect.everywhere and reach >= _ADJUSTED
             found.append(Explanation(
@@ -339,8 +336,7 @@ def means_of_columns(model: RecordingModel) -> dict[str, Floats]:
 
 def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, float]]:
     """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
-    for function in smooth_functions(covariate):
-        yield function, 1.0
+    yield from ((function, 1.0) for function in smooth_functions(covariate))
     distinct = np.unique(covariate)
     gaps = np.diff(distinct)
     apart = np.flatnonzero(gaps > same)
@@ -361,15 +357,17 @@ def _one_sided(functions: Iterable[tuple[Floats, float]]) -> Iterator[tuple[Floa
 
 def smooth_functions(covariate: Floats) -> Iterator[Floats]:
     """Factors (n, r), mm, of squared-exponential covariances over a covariate (Karhunen–Loève on a grid, Nyström beyond)."""
-    low, span = float(covariate.min()), float(np.ptp(covariate))
-    place = (covariate - low) / span
+    place = (covariate - covariate.min()) / float(np.ptp(covariate))
+    for length, (grid, vectors, root) in zip(LENGTH_SCALES, map(_on_grid, LENGTH_SCALES), strict=True):
+        yield UNKNOWN_SD * np.exp(-0.5 * ((place[:, None] - grid) / length) ** 2) @ vectors / root
+
+
+@cache
+def _on_grid(length: float) -> tuple[Floats, Floats, Floats]:
     grid = np.linspace(0, 1, _GRID)
-    for length in LENGTH_SCALES:
-        kernel = np.exp(-0.5 * ((grid[:, None] - grid[None, :]) / length) ** 2)
-        eigenvalues, vectors = scipy.linalg.eigh(kernel)
-        keep = eigenvalues > _KEPT * eigenvalues[-1]
-        cross = np.exp(-0.5 * ((place[:, None] - grid[None, :]) / length) ** 2)
-        yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+    eigenvalues, vectors = scipy.linalg.eigh(np.exp(-0.5 * ((grid[:, None] - grid) / length) ** 2))
+    keep = eigenvalues > _KEPT * eigenvalues[-1]
+    return grid, vectors[:, keep], np.sqrt(eigenvalues[keep])
 
 
 def smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGTHS) -> Iterator[Floats]:
@@ -381,5 +379,4 @@ def smooth_in_space(readings: Floats, lengths: tuple[float, ...] = _SPACE_LENGTH
     for length in lengths:
         eigenvalues, vectors = scipy.linalg.eigh(np.exp(-0.5 * among / length**2))
         keep = np.flatnonzero(eigenvalues > _KEPT * eigenvalues[-1])[-_SPACE_RANK:]
-        factor = np.exp(-0.5 * across / length**2) @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
-        yield UNKNOWN_SD * factor
+        yield UNKNOWN_SD * (np.exp(-0.5 * across / length**2) @ vectors[:, keep] / np.sqrt(eigenvalues[keep]))

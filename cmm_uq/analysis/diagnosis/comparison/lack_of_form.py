@@ -51,9 +51,8 @@ def likeliest_noise(comparison: CandidateComparison, families: Sequence[Function
 
 def _log_odds(comparison: CandidateComparison, families: Iterable[FunctionFamily], data: Floats) -> Floats:
     """Log odds (b,) of any function over nothing for data (m, b)."""
-    return np.asarray(
-        np.logaddexp.reduce(_of_forms(comparison, families, data)) - log_sum(comparison.of_nothing(data), 0)
-    )
+    found, nothing = _of_forms(comparison, families, data), comparison.of_nothing(data)
+    return np.asarray(np.logaddexp.reduce(found) - log_sum(nothing, 0))
 
 
 def _of_forms(comparison: CandidateComparison, families: Iterable[FunctionFamily], data: Floats) -> Floats:

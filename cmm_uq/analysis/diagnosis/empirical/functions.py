@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -242,12 +242,17 @@ def _families(term: FunctionTerm, seen: Seen, c: Floats, *, forms: bool = True, 
 
 def _rough_functions(covariate: Floats) -> Iterator[Floats]:
     """Factors (p, r), mm, of exponential covariances (Karhunen–Loève on a grid, Nyström beyond): wear, slip, uneven waves."""
-    place, grid = (covariate - covariate.min()) / float(np.ptp(covariate)), np.linspace(0, 1, _GRID)
-    for length in _ROUGH:
-        eigenvalues, vectors = np.linalg.eigh(np.exp(-np.abs(grid[:, None] - grid) / length))
-        keep = eigenvalues > _KEPT * eigenvalues[-1]
-        cross = np.exp(-np.abs(place[:, None] - grid) / length)
-        yield UNKNOWN_SD * cross @ vectors[:, keep] / np.sqrt(eigenvalues[keep])
+    place = (covariate - covariate.min()) / float(np.ptp(covariate))
+    for length, (grid, vectors, root) in zip(_ROUGH, map(_on_grid, _ROUGH), strict=True):
+        yield UNKNOWN_SD * np.exp(-np.abs(place[:, None] - grid) / length) @ vectors / root
+
+
+@cache
+def _on_grid(length: float) -> tuple[Floats, Floats, Floats]:
+    grid = np.linspace(0, 1, _GRID)
+    eigenvalues, vectors = np.linalg.eigh(np.exp(-np.abs(grid[:, None] - grid) / length))
+    keep = eigenvalues > _KEPT * eigenvalues[-1]
+    return grid, vectors[:, keep], np.sqrt(eigenvalues[keep])
 
 
 def _of_points(model: RecordingModel, values: Floats, comparison: CandidateComparison) -> Families:
