@@ -56,6 +56,7 @@ _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
 _AT_ONCE, _PAIRS = 1_000_000, 50_000  # displacements, and covariances of readings, that are held at once
 _MANY, _FEW = 20_000, 1000  # readings up to which the covariance is taken of each; up to which, where cells are known
 _PERIODS, _DEGREE = 8, 60  # shortest periods in a cell of an axis, and polynomials: off by 10⁻¹³ of the largest
+_TURN = MICROMETRE * 1j * np.exp(-2j * np.pi * np.arange(4096) / 4096)  # sine and i·cosine in as many parts of a turn
 _LOOKED_AT = 61  # readings
 TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
 _EACH = 4  # of these in each band, where the size of an error goes by its period
@@ -230,6 +231,7 @@ class GivenPeriod(Effect):
         length = _PERIODS * float(np.min(self.sum.at))
         place, found = reading / length, np.empty((len(reading), self.into.shape[1]))
         nodes = np.cos(np.pi * (np.arange(_DEGREE) + 0.5) / _DEGREE)
+        inverse = np.linalg.inv(chebvander(nodes, _DEGREE - 1))
         for some in np.array_split(np.argsort(place), 1 + len(place) * _DEGREE // _AT_ONCE):
             cells = np.floor(place[some])
             polynomials = chebvander(2 * (place[some] - cells) - 1, _DEGREE - 1)
@@ -237,9 +239,7 @@ class GivenPeriod(Effect):
             for first, last in pairwise(ends):
                 if (cell := float(cells[first])) not in self._cells:
                     values = self._said((cell + 0.5 + 0.5 * nodes) * length)
-                    self._cells[cell] = np.asarray(
-                        np.linalg.inv(chebvander(nodes, _DEGREE - 1)) @ values, dtype=np.float64
-                    )
+                    self._cells[cell] = np.asarray(inverse @ values)
                 found[some[first:last]] = polynomials[first:last] @ self._cells[cell]
         return found
 
@@ -267,9 +267,17 @@ class GivenPeriod(Effect):
 
 
 def _waves(reading: Floats, periods: Floats) -> Floats:
-    """(n, 2p) mm, sine and cosine of each period."""
-    angle = 2 * np.pi * reading[:, None] / periods
-    return MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
+    """(n, 2p) mm, sine and cosine of each period; of many readings by those of parts of a turn, and of what is left."""
+    if len(reading) <= _FEW:
+        angle = 2 * np.pi * reading[:, None] / periods
+        return MICROMETRE * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(reading), -1)
+    found, parts = np.empty((len(reading), len(periods)), dtype=np.complex128), 1 + len(reading) // _FEW
+    for some, each in zip(np.array_split(reading, parts), np.array_split(found, parts), strict=True):
+        turn = some[:, None] * (len(_TURN) / periods)
+        left = 2 * np.pi / len(_TURN) * (turn - np.rint(turn))
+        each.real, each.imag = 1 - left**2 * (0.5 - left**2 / 24), left * (left**2 / 6 - 1)
+        each *= _TURN[np.rint(turn).astype(np.intp) & len(_TURN) - 1]
+    return found.view(np.float64)
 
 
 def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
@@ -292,8 +300,7 @@ def covariance(effect: PeriodicScale, one: Floats, other: Floats) -> Floats:
 
 def _evenly(low: float, high: float, count: int) -> list[float]:
     """The middle of each of ``count`` equal parts of the logarithm, which have the same share of the prior each."""
-    each: list[float] = np.exp(np.log(low) + np.log(high / low) * (np.arange(count) + 0.5) / count).tolist()
-    return each
+    return [*map(float, np.exp(np.log(low) + np.log(high / low) * (np.arange(count) + 0.5) / count))]
 
 
 def linear(effect: Effect) -> Effect:

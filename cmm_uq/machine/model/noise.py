@@ -31,17 +31,14 @@ def noise_of(
     ``used``: (m,) which observations; by default those that the model uses. ``values``: (k,) of the model's parameters, of a
     recording yet to be made; by default those that it is estimated to have.
     """
-    artefact = model.artefact
-    chosen = model.used if used is None else used
+    artefact, chosen = model.artefact, model.used if used is None else used
     step = 0.0
     if values is None:
         estimate = model.estimate()
-        values = estimate.about
-        scatter = estimate.least_squares.sigma_of_residuals
+        values, scatter = estimate.about, estimate.least_squares.sigma_of_residuals
         step = display_step(artefact.points.xyz, scatter) or _step_of_lengths(artefact.points, scatter)
     xyz = model.placed(values)
-    sensitivity = sensitivities(model, xyz)[chosen]
-    rows = artefact.rows[chosen]
+    sensitivity, rows = sensitivities(model, xyz)[chosen], artefact.rows[chosen]
     turn, along = machine_axes(rows, sensitivity)
     block = repeated_quantity(model, chosen)
     helmert, count = _helmert(block)
@@ -165,16 +162,14 @@ def number_in_reading(model: RecordingModel) -> Ints:
     reading = np.column_stack([artefact.measurement, artefact.repeat, points])
     _, index = np.unique(reading, axis=0, return_inverse=True)
     order = np.argsort(index.ravel(), kind="stable")
-    first = np.concatenate([[True], np.diff(index.ravel()[order]) > 0])
-    place, number = np.arange(len(order)), np.empty(len(order), dtype=np.int64)
-    number[order] = place - np.maximum.accumulate(np.where(first, place, 0))
+    number, first = np.empty(len(order), dtype=np.int64), np.unique(index.ravel()[order], return_index=True)[1]
+    number[order] = np.arange(len(order)) - first[index.ravel()[order]]
     return number
 
 
 def _helmert(block: Ints) -> tuple[scipy.sparse.csr_array, Floats]:
     """Turns repeats into their mean, times √n, and contrasts; and n (m,) for the former, 0 for the latter."""
-    m = len(block)
-    order = np.argsort(block, kind="stable")
+    m, order = len(block), np.argsort(block, kind="stable")
     _, starts, sizes = np.unique(block[order], return_index=True, return_counts=True)
     at, across, values, count = [], [], [], np.zeros(m)
     for n in np.unique(sizes):
@@ -210,8 +205,7 @@ def mean_and_contrasts(n: int) -> scipy.sparse.csr_array:
 
 def _contrasts(n: int) -> Floats:
     """(n − 1, n) orthonormal, each with the sum zero (Helmert)."""
-    rows = np.tril(np.ones((n - 1, n)))
-    i = np.arange(1, n)
+    rows, i = np.tril(np.ones((n - 1, n))), np.arange(1, n)
     rows[i - 1, i] = -i
     return np.asarray(rows / np.sqrt(i * (i + 1))[:, None])
 

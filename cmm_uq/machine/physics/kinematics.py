@@ -302,8 +302,7 @@ def rotate(rotation: Floats, vectors: Floats) -> Floats:
     """Vectors (n, 3) turned by rotation vectors (n, 3) in rad, without loss for tiny angles (Rodrigues)."""
     angle = np.linalg.norm(rotation, axis=-1, keepdims=True)
     # sin(a)/a and (1 − cos a)/a² as sinc, which is exact at a = 0
-    first = np.sinc(angle / np.pi)
-    second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
     turned = np.cross(rotation, vectors)
     return np.asarray(vectors + first * turned + second * np.cross(rotation, turned))
 

@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.points import Points
-from cmm_uq.machine.model.field import ALLOWED, FAMILIES, WAVES, AxisFunction, allowed, bounded, curves, family_of
+from cmm_uq.machine.model.field import (
+    ALLOWED,
+    FAMILIES,
+    WAVES,
+    AxisFunction,
+    _waves,
+    allowed,
+    bounded,
+    curves,
+    family_of,
+)
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.machine.physics.effect import Family
 from tests.parts_drawn import MACHINE
@@ -117,3 +127,14 @@ def test_a_bound_is_what_ninety_five_of_a_hundred_do_not_exceed() -> None:
     assert [one.prior_sd for one in wave.coefficients] == pytest.approx([0.5 / 2.447747] * 2)
     assert (family_of(gap), family_of(wave)) == (None, None)
     assert EVERY["hysteresis_x"].coefficients[0].prior_sd == 30.0
+
+
+def test_many_waves_are_those_of_each_reading() -> None:
+    """Of parts of a turn and what is left of it, as far as the angle itself is exact; in extended precision beside it."""
+    readings, periods = np.random.default_rng(1).uniform(-600, 1200, 3000), np.array([0.53, 8.0, 970.0])
+    angle = 2 * np.pi * readings.astype(np.longdouble)[:, None] / periods
+    exact = 1e-3 * np.stack([np.sin(angle), np.cos(angle)], axis=2).reshape(len(readings), -1)
+    one_by_one = np.concatenate([_waves(readings[i : i + 100], periods) for i in range(0, 3000, 100)])
+    off, before = (np.abs(found - exact).max() for found in (_waves(readings, periods), one_by_one))
+    assert off < 1e-3 * 2**-52 * 2 * np.pi * 1200 / 0.53
+    assert off < 2 * before

@@ -196,12 +196,14 @@ class Precision:
     log: float
     basis: Floats
 
+    def white(self, columns: Floats) -> Floats:
+        """Whitened columns (m, b)."""
+        return np.asarray(self.whitening @ columns if self._diagonal is None else self._diagonal * columns)
+
     def __call__(self, columns: Floats) -> Floats:
         """Precision times columns (m, b)."""
-        if self._diagonal is None:
-            whole = self.whitening.T @ (self.whitening @ columns)
-        else:
-            whole = self._diagonal * (self._diagonal * columns)
+        white = self.white(columns)
+        whole = self.whitening.T @ white if self._diagonal is None else self._diagonal * white
         return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
 
     def explained(self, white: Floats) -> Floats:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.diagnosis.comparison.algebra import Precision, eigen, log_sum, log_sum_in
+from cmm_uq.analysis.diagnosis.comparison.algebra import Precision, eigen, log_sum, log_sum_in, squared
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import TAIL, draw_nothing, is_clear, tail_probability
 from cmm_uq.analysis.diagnosis.empirical.functions import FunctionFamily
@@ -58,10 +58,11 @@ def _log_odds(comparison: CandidateComparison, families: Iterable[FunctionFamily
 def _of_forms(comparison: CandidateComparison, families: Iterable[FunctionFamily], data: Floats) -> Floats:
     """Log evidence (k, b) of functions, by kind of noise, for data (m, b), the size of few coefficients at its likeliest."""
     degrees, found = comparison.degrees_of_freedom, np.full((len(comparison.kinds), data.shape[1]), -np.inf)
-    totals = [np.einsum("mb,mb->b", data, noise(data)) for noise in comparison.precisions]
+    weighed = [noise(data) for noise in comparison.precisions]
     for columns, log_prior in map(joined, alike(families)):
-        for k, (noise, square, total) in enumerate(zip(comparison.precisions, comparison.squares, totals, strict=True)):
-            weighed, strengths, seen = _along_axes(noise, columns, _SHOWS**2 * float(square))
+        rows = np.ascontiguousarray(columns.transpose(1, 2, 0))
+        for k, (noise, square, by) in enumerate(zip(comparison.precisions, comparison.squares, weighed, strict=True)):
+            turn, strengths, seen = _along_axes(noise, rows, _SHOWS**2 * float(square))
             if strengths.shape[1] <= _FITTED:
                 gain = 1 / strengths[:, None]
                 constant = np.full((len(strengths), 1), -0.5 * strengths.shape[1] * np.log(degrees))
@@ -72,7 +73,8 @@ def _of_forms(comparison: CandidateComparison, families: Iterable[FunctionFamily
                 constant = -0.5 * np.log1p(ratio).sum(axis=2) - np.log(len(_SIZES))
             constant += noise.log + log_prior[seen, None]
             if len(strengths):
-                log = comparison.integrated(total - gain @ (weighed @ data) ** 2) + constant[:, :, None]
+                shown = turn.swapaxes(1, 2) @ (rows[seen] @ by)
+                log = comparison.integrated(np.einsum("mb,mb->b", data, by) - gain @ shown**2) + constant[:, :, None]
                 found[k] = np.logaddexp(found[k], log_sum_in(log.reshape(-1, data.shape[1]), 0))
     return found
 
@@ -94,17 +96,11 @@ def joined(some: Sequence[FunctionFamily]) -> tuple[Floats, Floats]:
     return np.concatenate([each.columns for each in some], axis=1), log_prior
 
 
-def _along_axes(noise: Precision, columns: Floats, least: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Of functions (m, K, r) weighed rows (K', r, m) along principal axes and strengths (K', r), and which show so much."""
-    m, _, r = columns.shape
-    flat = columns.reshape(m, -1)
-    weighed = noise(flat).T.reshape(-1, r, m)
-    strengths, turn = eigen(weighed @ columns.transpose(1, 0, 2)) if r > 1 else _alone(weighed, columns)
-    most = _UNABSORBED**2 * np.sum((noise.whitening @ flat).reshape(m, -1, r) ** 2, axis=(0, 2))
+def _along_axes(noise: Precision, rows: Floats, least: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Principal axes (K', r, r) and strengths (K', r) of functions as rows (K, r, m), and which show so much."""
+    flat = rows.reshape(-1, rows.shape[2])
+    whole, taken = (squared(part.reshape(*rows.shape[:2], -1)) for part in (noise.white(flat.T).T, flat @ noise.rows.T))
+    strengths, turn = eigen(whole - taken)
+    most = _UNABSORBED**2 * np.einsum("krr->k", whole)
     seen = strengths.sum(axis=1) > np.maximum(least, most)
-    rows = turn[seen].swapaxes(1, 2) @ weighed[seen] if r > 1 else weighed[seen]
-    return rows, np.maximum(strengths[seen], most[seen, None]), seen
-
-
-def _alone(weighed: Floats, columns: Floats) -> tuple[Floats, Floats]:
-    return np.einsum("krm,mkr->kr", weighed, columns), np.ones((len(weighed), 1, 1))
+    return turn[seen], np.maximum(strengths[seen], most[seen, None]), seen
