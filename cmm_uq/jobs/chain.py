@@ -18,16 +18,8 @@ from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.acquired import ARTEFACT
 from cmm_uq.jobs.job import CIRCULAR, Job
 from cmm_uq.jobs.reports import AS_FOUND
-from cmm_uq.jobs.tables.artefact import (
-    ACCREDITED,
-    CONSENSUS,
-    IN_HOUSE,
-    MATERIAL,
-    NATIONAL,
-    OTHER,
-    Traceability,
-    nameless,
-)
+from cmm_uq.jobs.tables import artefact as artefacts
+from cmm_uq.jobs.tables.artefact import ACCREDITED, CONSENSUS, MATERIAL, NATIONAL, OTHER, Traceability
 from cmm_uq.jobs.tables.identification import MEASURED, NO_DATE
 
 # what a statement of traceability says; the last where nothing that is certified enters
@@ -142,7 +134,7 @@ def right(chain: Traceability) -> Text:
         )  # fmt: skip
     if chain.issuer in (ACCREDITED, OTHER):
         return say("a laboratory that no arrangement covers (route 3b of ILAC-P10:07/2020{held})", held=held)
-    if chain.issuer == IN_HOUSE:
+    if chain.issuer == artefacts.IN_HOUSE:
         return say("an in-house calibration (ILAC-P10:07/2020, 2{held})", held=held)
     if chain.issuer == MATERIAL:
         return say("a certified reference material (ILAC-P10:07/2020{held})", held=held)
@@ -213,7 +205,7 @@ def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
             yield Link(one.called(own), f"[[thermometer]] {number} certificate", one.certificate, date, True, another)
     known = {name for one in facts.thermometer for name in one.columns}
     for name in sorted(columns - known):
-        yield Link(nameless([name]), "[[thermometer]] certificate", None, date, True)
+        yield Link(artefacts.nameless([name]), "[[thermometer]] certificate", None, date, True)
 
 
 def holds_on(chain: Traceability, day: dt.date) -> bool:

@@ -25,18 +25,9 @@ from cmm_uq.jobs.importing.format import ImportKeys, Recognition
 from cmm_uq.jobs.recording.beside import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.recording.compared import Prediction, SimulationFacts
 from cmm_uq.jobs.reports import AsFound
+from cmm_uq.jobs.tables import conformity as rules
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ThermometerFacts, Traceability
-from cmm_uq.jobs.tables.conformity import (
-    Circumstances,
-    ClausesForm,
-    ConformityFacts,
-    RatedConditions,
-    TestUncertainty,
-    needed,
-    probe_unfit,
-    standards_in,
-    uncertainty_missing,
-)
+from cmm_uq.jobs.tables.conformity import Circumstances, ConformityFacts, RatedConditions, TestUncertainty
 from cmm_uq.jobs.tables.identification import MEASURED, DerivedFrom, Identification, Laboratory, Origin
 from cmm_uq.jobs.tables.machine import MachineFacts, ProbeFacts
 from cmm_uq.jobs.tables.plan import AcquireFacts, EffectFacts, PlanFacts, ProveFacts
@@ -180,8 +171,8 @@ class JobFile(JobTable):
         by_points = artefact.with_references and artefact.u_um is None  # which the recording may state of each
         whole = artefact.model_copy(update={"u_um": 1.0}) if by_points else artefact
         for wish in wishes:
-            if missing := uncertainty_missing(wish, whole, uncertainty, standards_in(info)):
-                raise ValueError(". ".join(needed(missing, wish)))
+            if missing := rules.uncertainty_missing(wish, whole, uncertainty, rules.standards_in(info)):
+                raise ValueError(". ".join(rules.needed(missing, wish)))
         return wishes
 
     @field_validator("conformity")
@@ -190,7 +181,7 @@ class JobFile(JobTable):
         if "probe" in info.data and "machine" in info.data:
             sensing = _sensing(info.data["probe"], info.data["machine"])
             for wish in wishes:
-                if unfit := probe_unfit(wish, sensing, standards_in(info)):
+                if unfit := rules.probe_unfit(wish, sensing, rules.standards_in(info)):
                     raise ValueError(unfit)
         return wishes
 
@@ -279,7 +270,7 @@ class Job:
     imported: tuple[Recognition, ...] = ()
     acquired: Provenance | None = None
     certified: Mapping[str, Any] = field(default_factory=dict)
-    clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
+    clauses: Mapping[str, rules.ClausesForm] = field(default_factory=dict)
     further: tuple[str, ...] = ()
 
     @property

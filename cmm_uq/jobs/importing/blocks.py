@@ -294,11 +294,8 @@ class CutSheet:
         # what was touched lies elsewhere each time
         digits = max(1, round(-np.log10(1000 * self.touched.get(block.number, 1e-13))))
         said = {of: "; ".join(f"{one:.{digits}f}".rstrip("0").rstrip(".") for one in own) for of, own in values.items()}
-        texts += [
-            f"{of} ({said[of]})" if len(own) == 3 else f"{of} = {said[of]}"
-            for of, own in values.items()
-            if len(own) == 3 or of in {*"XYZ"}
-        ]
+        whole = {of: len(own) == 3 for of, own in values.items() if len(own) == 3 or of in {*"XYZ"}}
+        texts += [f"{of} ({said[of]})" if three else f"{of} = {said[of]}" for of, three in whole.items()]
         return tuple(texts)
 
     def _held(self, row: int, columns: Sequence[int], first: int) -> list[float]:
@@ -341,17 +338,9 @@ class CutSheet:
                 break
             between = range(self.sheet.lines[row] + 1, self.sheet.lines[head[0]] if head else 0)
             texts = [self.text(row, k) for k in filled]
-            odd = any(
-                len(text) > 60
-                or (
-                    len(filled) < 4
-                    and "=" in COVERAGE.sub("", text)
-                    and not says_role(text)
-                    and not places.says_figures(text)
-                )
-                or len(_PRINTED.findall(_BRACKETS.sub("", text))) > 1
-                for text in texts
-            )
+            few = [text for text in texts if "=" in COVERAGE.sub("", text)] if len(filled) < 4 else []
+            odd = any(not (says_role(text) or places.says_figures(text)) for text in few)
+            odd |= any(len(text) > 60 or len(_PRINTED.findall(_BRACKETS.sub("", text))) > 1 for text in texts)
             odd = odd or 0 < sum(DATED.search(text) is not None for text in texts) < 3 or counts_pages(self.line(row))
             over = [k for k in filled if k in numbers]
             said = sum(map(places.says_figures, texts))

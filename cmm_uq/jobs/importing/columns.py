@@ -147,12 +147,8 @@ class ExportTable:
             self.cells = list(zip(*body, strict=True))
         self.called = named_alike(sheet.rows, self.rows)  # rows ahead of results
         self.kinds = all(map(is_summary, body))  # then a word for summaries is one for something else, as S for spheres
-        if (
-            not self.cells
-            or self.called < len(body)
-            or any("" in self.cells[i] for i in needed)
-            or any(map(is_summary, body))
-        ):
+        uneven = not self.cells or self.called < len(body) or any(map(is_summary, body))
+        if uneven or any("" in self.cells[i] for i in needed):
             self.rows, self.after = self._usable(needed)
             if not self.rows:
                 fix = "Export the table with its figures"

@@ -93,7 +93,8 @@ def senses(labels: Sequence[Label], targets: Sequence[float]) -> list[int] | Non
             both = Counter[float]()
             for target, way in zip(targets, own, strict=True):
                 both[target] += way
-            if sum(n == 0 for n in both.values()) >= 0.8 * len(both):
+            few = max(map(abs, both.values())) < 2  # one of them left out
+            if sum(n == 0 for n in both.values()) >= (0.5 if few else 0.8) * len(both):
                 return own
     return None
 

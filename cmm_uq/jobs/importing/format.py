@@ -299,7 +299,14 @@ _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
 )  # fmt: skip
 # Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
-    *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc", "reports.Calypso", "reports.Qdas"),
+    *(
+        "tabular.Excel",
+        "tabular.OpenDocument",
+        "documents.Qif",
+        "documents.Dcc",
+        "reports.Calypso",
+        "lengths.q_das.Qdas",
+    ),
     *("reports.Dmis", "pcdmis.PcDmis", "reports.Ipp", "lines.Rtl", "documents.Html", "documents.Json", "documents.Xml"),
 )
 
@@ -324,7 +331,7 @@ def format_of(content: bytes, where: str) -> Format:
 
 @cache
 def _built_in(name: str) -> Format:
-    module, _, cls = name.partition(".")
+    module, _, cls = name.rpartition(".")
     form: Format = getattr(import_module(f"cmm_uq.jobs.importing.{module}"), cls)()
     return form
 

@@ -103,11 +103,8 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
     if max((way.rank for way in ways), default=0) < _RESTARTED and len(xyz) <= _COMPARED and not (plate or named):
         ways += filter(None, (_grouped(of, found, place, xyz) for of in _in_turn(xyz)))
     names = (f for f in found if place.max() == 0 and f[1].max() + 1 == len(xyz) and f[0].sort == "column")
-    if any(
-        f[2] == LINE or not all(map(str.isdecimal, f[0].values))
-        for f in names
-        if f[2] != RUN and not factors.counting(f[0].values)
-    ):
+    names = (f for f in names if f[2] != RUN and not factors.counting(f[0].values))
+    if any(f[2] == LINE or not all(map(str.isdecimal, f[0].values)) for f in names):
         return None  # as of styli, of which each came to one place
     every_row = factors.together(0 * place, *(f[1] for f in found)).max() + 1 == len(xyz)
     scanned = every_row and len(xyz) > _MANY_ON_A_BALL and 4 * (len(xyz) - place.max() - 1) < len(xyz)
@@ -117,11 +114,8 @@ def points_told_apart(labels: Sequence[Label], xyz: Floats) -> dict[str, list[st
         return _told(Grouping(0.0, None, 0 * place, place, None), found, xyz, labels)  # a list, and nothing else
     if not plate and _copied(ways, xyz) and all(way.of is None or way.rank < _NAMED for way in ways):
         return None  # names of points, which may be one artefact in several places
-    ways = [
-        way
-        for way in ways
-        if way.rank >= _NAMED and not (plate and way.of and way.of[0].sort == "part" and way.rank < _WORDS)
-    ]
+    parts = [way for way in ways if plate and way.of and way.of[0].sort == "part" and way.rank < _WORDS]
+    ways = [way for way in ways if way.rank >= _NAMED and not any(way is part for part in parts)]
     best = max(ways, key=lambda way: (way.rank, -way.measurement.max()), default=None)
     if best is None:
         return None
@@ -303,6 +297,12 @@ def _on_a_ball(xyz: Floats) -> bool:
     centre = np.linalg.lstsq(sides, np.sum(about**2, axis=1), rcond=None)[0][:3]
     distance = np.linalg.norm(about - centre, axis=1)
     return bool(distance.max() < _LARGEST_BALL_MM and np.ptp(distance) < _FORM_MM)
+
+
+def scattered(xyz: Floats) -> bool:
+    """Whether places (n, 3) are many, in no plane and on no ball, as targets about a part or a jig are."""
+    thickness = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)[2] / np.sqrt(len(xyz))
+    return len(xyz) > _PROBED and bool(thickness > 1) and not _on_a_ball(xyz)
 
 
 def _elsewhere(xyz: Floats, at: Ints, label: Ints) -> bool:

@@ -18,17 +18,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES
 from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.columns import COORDINATES, OPTIONAL, READINGS, REQUIRED
+from cmm_uq.jobs.importing import format as formats
 from cmm_uq.jobs.importing.cells.encodings import is_number
-from cmm_uq.jobs.importing.format import (
-    TABLES,
-    Cell,
-    ImportKeys,
-    NotReadError,
-    Sheet,
-    WrittenUnit,
-    sources_of,
-    unit_named,
-)
+from cmm_uq.jobs.importing.format import Cell, ImportKeys, NotReadError, Sheet, WrittenUnit, sources_of, unit_named
 
 _LAST_SPACED = "\u2e7f"  # ahead of Chinese, Japanese and Korean characters
 NAME = "name"  # of the point or feature, by which it may be numbered; no column of a recording
@@ -66,7 +58,7 @@ def numbered_words(text: str) -> tuple[tuple[str, ...], list[int]]:
 @cache
 def printed_words(table: str) -> Mapping[str, tuple[str, ...]]:
     """Phrases of a table of ``words.toml`` by name."""
-    return {name: tuple(phrase.strip() for phrase in text.split(",")) for name, text in TABLES[table].items()}
+    return {name: tuple(phrase.strip() for phrase in text.split(",")) for name, text in formats.TABLES[table].items()}
 
 
 @cache

@@ -36,6 +36,7 @@ Stated = Mapping[str, tuple[str, str]]
 """Places of lines by name, as a file says them, with ? for what it leaves open, and its words."""
 
 
+_SAME_TARGET = 0.5  # mm or °, by which targets of runs may differ where each was set anew
 _SAME_LENGTH = 0.1  # mm, within which lengths of runs of their own are one length
 
 
@@ -86,11 +87,8 @@ def placed(
     if not all(bare):
         columns[REFERENCE] = np.array([[0.0, reference] for reference in table.reference], dtype=np.float64).ravel()
     columns |= {name: np.repeat(values, 2) for name, values in table.beside.items()}
-    return (
-        columns,
-        (_told(wanted, places, by_file), *_same_place(wanted, places)),
-        [line for line in table.lines for _ in range(2)],
-    )
+    facts = (_told(wanted, places, by_file), *_same_place(wanted, places))
+    return columns, facts, [line for line in table.lines for _ in range(2)]
 
 
 def _measured_again(table: MeasuredLengths) -> list[tuple[str, float | None]]:
@@ -126,11 +124,8 @@ def _same_place(names: Sequence[str], places: Mapping[str, str]) -> tuple[Fact, 
     at: dict[tuple[float, ...], list[str]] = {}
     for name in names:
         at.setdefault(tuple(np.round(np.concatenate(place_of(places[name])), 6).tolist()), []).append(name)
-    told = [
-        say("{names} ({place})", names=commas(map(Verbatim, own)), place=Verbatim(places[own[0]]))
-        for own in at.values()
-        if len(own) > 1
-    ]
+    several = ((commas(map(Verbatim, own)), Verbatim(places[own[0]])) for own in at.values() if len(own) > 1)
+    told = [say("{names} ({place})", names=those, place=place) for those, place in several]
     return (Fact(SAME_PLACE, say("Lines at the very same place"), semicolons(told)),) if told else ()
 
 
@@ -156,6 +151,7 @@ _SECTION, _KEY = (
     re.compile(r"([A-Z][A-Z -]{0,40})::(?:\s.*)?"),
     re.compile(r"([A-Za-z][\w -]{0,40}?)\s{0,9}:\s{0,9}(.{0,200})"),
 )
+LEAST_UM = 0.05  # that the deviations of an axis are, in µm, at least in one of its targets
 _LINEAR, _TRIPLE = {"linear", "rtl", ""}, 3
 _HEADS = (("run",), ("target", "point"), ("error", "deviation", "data"))  # of the columns of a run
 _AGAIN, _SHOWN = "Export the runs anew", 40
@@ -218,12 +214,27 @@ def placed_runs(
             raise error
     for run in runs:
         start, direction = place_of(places[run.axis])
-        measurement, first = axes.index(run.axis) + 1, 0 if run.way >= 0 else len(run.targets)
-        for k, (target, deviation, line) in enumerate(run.targets, 1):
+        there, own = (
+            _targets([one for one in runs if (one.axis, one.way < 0) == (run.axis, back)])
+            for back in (False, run.way < 0)
+        )
+        measurement, first = axes.index(run.axis) + 1, 0 if run.way >= 0 else len(there or own)
+        for k, (target, deviation, line) in enumerate(run.targets):
             xyz, read, approach = run.at(target, start, direction)
             reading = (*xyz, deviation, *read, *approach)
-            rows.append(("", [f"{cell:.10g}" for cell in (measurement, first + k, run.number, *reading)], line))
+            number = first + 1 + (k if len(run.targets) == len(own) else own.index(target))
+            rows.append(("", [f"{cell:.10g}" for cell in (measurement, number, run.number, *reading)], line))
     return units.sheets_of(rows, HEADINGS, unit="mm", decimal=".", facts=(*facts, _told(axes, places, stated)))
+
+
+def _targets(runs: Sequence[AxisRun]) -> list[float]:
+    """Targets of runs of one sense in their turn, those too that one of them has and another leaves out."""
+    each = [[target for target, *_ in run.targets] for run in runs]
+    longest = max(each, key=len, default=[])
+    sizes = {len(own) for own in each}
+    if len(sizes) < 2 and (np.ptp(np.sort(each), axis=0) < _SAME_TARGET).all():
+        return longest
+    return sorted({target for own in each for target in own}, reverse=longest[0] > longest[-1])
 
 
 class _Runs:
@@ -249,7 +260,7 @@ class _Runs:
             elif section == "DATA" and (words := text.lower().split())[0] == "run":
                 head = [words.index(next(filter(own.__contains__, words), words[-1])) for own in _HEADS]
                 part = "run target data"
-            elif section in ("DEVIATIONS", "DATA", "TARGET DATA") and part.startswith("run target data"):
+            elif section in ("DEVIATIONS", "DATA", "RUN DATA", "TARGET DATA") and part.startswith("run target data"):
                 cells = text.split()
                 picked = [cells[k] for k in head if k < len(cells)] if head and len(cells) == len(words) else cells
                 figures = self._figures(" ".join(picked), f"{where} line {number}")
@@ -273,6 +284,18 @@ class _Runs:
         for run, rows in self.runs.items():
             if sorted(target for target, _, _ in rows) != list(range(len(self.targets))):
                 raise CmmUqError(f"run {run} has not each target once", where=f"{where} line {rows[0][2]}", fix=_AGAIN)
+        self._in_micrometres(where)
+
+    def _in_micrometres(self, where: str) -> None:
+        """Deviations finer than any machine's in µm are in the unit of the file; an error where it names none."""
+        every = [abs(deviation) for rows in self.runs.values() for _, deviation, _ in rows]
+        if max(every) >= LEAST_UM or not any(every):
+            return
+        if (unit := units.length_named(self.facts.get("units", ""))) is None:
+            what = f"its deviations, {max(every):g} at most, are too small for µm, and nothing says their unit"
+            raise CmmUqError(what, where=where, fix='Write it below the axis: "Units: mm"')
+        by = unit.metres * 1e6
+        self.runs = {n: [(k, deviation * by, line) for k, deviation, line in rows] for n, rows in self.runs.items()}
 
     @staticmethod
     def _figures(text: str, place: str) -> list[float]:

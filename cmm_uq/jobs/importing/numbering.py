@@ -11,16 +11,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.cells.encodings import is_number, values_of
-from cmm_uq.jobs.importing.factors import (
-    RUN,
-    Label,
-    codes,
-    counted,
-    in_turn,
-    numbered_runs,
-    parts_of,
-    together,
-)
+from cmm_uq.jobs.importing.factors import RUN, Label, codes, counted, in_turn, numbered_runs, parts_of, together
 from cmm_uq.jobs.importing.format import Cell, Fact, ImportKeys, NotReadError
 from cmm_uq.jobs.importing.grouping import points_told_apart
 
@@ -117,6 +108,20 @@ def numbered_points(
         if told is not None:
             facts.append(Fact(f"{name}_names", say("Names in {column}", column=Verbatim(name)), told))
     return numbers, facts
+
+
+def refuse_uneven(columns: Mapping[str, Floats], where: str) -> None:
+    """Numbers that contradict each other as a whole: points that come again very unequally, repeats that nothing has."""
+    own = np.column_stack([columns[name] for name in (MEASUREMENT, POINT)])
+    often = np.unique(own, axis=0, return_counts=True)[1]
+    numbers, most, least = len(np.unique(columns[REPEAT])), int(often.max()), int(often.min())
+    what = ""
+    if most > 2 * least and 2 * np.bincount(often).max() <= len(often):  # and no point to which all came back
+        what = f"its points come again {least} to {most} times, as styli and other things do that are no repeats"
+    elif numbers > 2 * most:
+        what = f"its repeats have {numbers} numbers, and no point was measured more than {most} times"
+    if what:
+        raise NotReadError(what, where=where, fix=_FIX)
 
 
 def _within(columns: Mapping[str, Floats]) -> Floats:

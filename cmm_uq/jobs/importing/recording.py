@@ -28,6 +28,7 @@ from cmm_uq.jobs.importing.lengths.axis_runs import axis_runs
 from cmm_uq.jobs.importing.lengths.circles import centre_of, circles_of
 from cmm_uq.jobs.importing.lengths.other_kinds import other_kind
 from cmm_uq.jobs.importing.lines import COLUMNS, REFERENCE, MeasuredLengths, placed, placed_runs
+from cmm_uq.jobs.importing.numbering import NUMBERS, REPEAT, refuse_uneven
 from cmm_uq.jobs.importing.roles import at_places, said
 from cmm_uq.jobs.importing.tabular import alternatives
 from cmm_uq.jobs.importing.understanding import Understanding, understand
@@ -61,6 +62,8 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
     """A recording in any format that is known."""
     table = _imported(content, where, keys, POINTS, reach_mm)
     headings, columns = table.recognised.columns, table.columns
+    if REPEAT in columns and not ({*NUMBERS} & {*headings, *keys.columns} or keys.points_per_measurement):
+        refuse_uneven(columns, where)
     uncertainties = [name for name in columns if name.startswith("reference_u_") or name == "reference_U_um"]
     others = [name for name in uncertainties if headings[name] != name and name not in keys.columns]
     if not others or any(name.startswith("reference_") and name.endswith("_mm") for name in columns):
@@ -252,12 +255,9 @@ def _chosen(
     if not tables:
         raise heads.no_header(sheets, keys, where, wanted)
     if len(tables) > 1:
-        listed = ", ".join(repr(sheet.name) for sheet, _ in tables)
-        raise (CmmUqError if tables[0][0].listed else NotReadError)(
-            f"holds {len(tables)} tables of points: {listed}",
-            where=where,
-            fix=f'Say which: sheet = "{tables[0][0].name}"',
-        )
+        error, first = CmmUqError if tables[0][0].listed else NotReadError, tables[0][0].name
+        what = f"holds {len(tables)} tables of points: {', '.join(repr(sheet.name) for sheet, _ in tables)}"
+        raise error(what, where=where, fix=f'Say which: sheet = "{first}"')
     return tables[0]
 
 

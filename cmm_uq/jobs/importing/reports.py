@@ -244,56 +244,6 @@ def _feature(match: re.Match[str], line: int, where: str) -> Row | None:
     return sort.lower(), [match["name"], *numbers[:3], *direction], line
 
 
-_FIELD = re.compile(r"K(?P<key>\d{4})(?:/(?P<which>\d+))?\s+(?P<text>.*)")
-
-
-_OF_AXIS = re.compile(r"(?<![^\W\d_])[XYZ](?![^\W\d_])", re.IGNORECASE)
-
-
-class Qdas(TextReport):
-    """Q-DAS transfer files: of each characteristic name (K2002), nominal value (K2101), unit (K2142) and values.
-
-    A value is a line K0001, or a part of a line without key: characteristics in their order between 0x0F, of each the value,
-    its attribute (0 where it is valid), time and more between 0x14.
-    """
-
-    name = "q-das"
-    title = say("Q-DAS transfer file (.dfq)")
-    shows = (re.compile(r"\A\ufeff*\s*K0100\s"),)
-
-    def sheets(self, lines: Sequence[str], where: str, keys: ImportKeys, encoding: Fact) -> Sequence[Sheet]:
-        said: dict[tuple[str, str], str] = {}
-        counted = Counter[str]()
-        rows: list[Row] = []
-        for line, content in enumerate(lines, 1):
-            match, at = _FIELD.fullmatch(content.strip()), f"{where} line {line}"
-            values: list[tuple[str, str]] = []
-            attributes = [match["text"]] if match and match["key"] == "0002" else []
-            if match is not None:
-                said[match["key"], match["which"] or "0"] = match["text"]
-                values += [(match["which"] or "", match["text"])] if match["key"] == "0001" else []
-            elif content.strip():
-                parts = [(*part.split("\x14"), "0")[:2] for part in content.strip("\r\n\x0f").split("\x0f")]
-                order = [which for key, which in said if key == "2002"]
-                if len(parts) != len(order) or not all(value.strip() for value, _ in parts):
-                    what = f"has no key K, and not a value for each of {len(order)} characteristics (K2002)"
-                    raise NotReadError(what, where=at, fix="Export values with keys (K0001/1 …)")
-                attributes = [attribute for _, attribute in parts]
-                values = [(which, value) for which, (value, _) in zip(order, parts, strict=True)]
-            if {*map(str.strip, attributes)} - {"0", ""}:
-                raise NotReadError("marks a value as invalid (K0002)", where=at, fix="Take it out")
-            for which, text in values:
-                name, nominal = (said.get((one, which), "") for one in ("2002", "2101"))
-                if not which or not (nominal or _OF_AXIS.search(name)):
-                    raise NotReadError("has no nominal value (K2101)", where=at, fix="Export K2001 ff. too")
-                counted[which] += 1
-                rows.append(("", [name or which, f"{counted[which]}", nominal, text.strip()], line))
-        units = {text for (key, _), text in said.items() if key == "2142"}
-        if len(units) > 1:
-            raise CmmUqError(f"is in {' and '.join(sorted(units))}", where=where, fix="Export it in one unit")
-        return sheets_of(rows, ["name", "run", "nominal", "measured"], unit=next(iter(units), None), facts=(encoding,))
-
-
 _LINE = re.compile(r"(?:^|[\s>\]:])(?P<tag>[E\d]\d{4})\s+(?P<what>[#&%!]|[A-Za-z]\w*\s*\()\s*(?P<rest>.*)$")
 _TERM = re.compile(r"\b(X|Y|Z|IJK)\s*\(([^)]*)\)")
 _IPP = re.compile(r"(?:\b\d{5}[ \t]+(?:StartSession[ \t]*\(|PtMeas[ \t]*\(|[&%#])(?s:.*?)){2}")

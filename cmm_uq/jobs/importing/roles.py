@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache, lru_cache
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -206,13 +207,8 @@ class SheetReading:
         for c in columns:
             name, sort = called[c.i], sort_of(called[c.i])
             way = self.kind == "lengths" and name in ("nx", "ny", "nz")  # of the line, and no normal of a surface
-            if (
-                c.i not in used
-                and name in _FURTHER
-                and c.full
-                and not way
-                and not (sort and c.unit and sort[0] != c.unit.sort)
-            ):
+            other = sort and c.unit and sort[0] != c.unit.sort
+            if c.i not in used and name in _FURTHER and c.full and not (way or other):
                 self.further[name] = converted(c.values, c.unit, name) if c.unit and sort else c.values
         of_way = [] if self.kind != "lengths" else grid.columns_of_places(rows[0]).get(DIRECTION, [])  # and no names
         used |= {*of_way} if len(of_way) == len(COORDINATES) else set()
@@ -298,6 +294,12 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
             unit = unit or (UNITS[name[-2:]] if name.startswith("deviation_") else None)
         found.append(FigureColumn(i, path, values, float(min(steps[np.isfinite(values)])), unit, role, name in _ROLES))
     _deny_summaries(found)
+    for c, after in pairwise(found):  # below one head over several columns
+        alike = (
+            after.i == c.i + 1 and c.role in ("measured", "deviation") and (c.step, c.full) == (after.step, after.full)
+        )
+        if alike and any(c.path) and not any(after.path):
+            after.path, after.role, after.unit = c.path, c.role, c.unit
     return found
 
 

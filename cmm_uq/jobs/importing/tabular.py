@@ -267,11 +267,8 @@ def _without_hidden(sheet: Sheet, of: Any, content: bytes) -> Sheet:
         f"{sheet.name} row {line}: {' '.join(map(text_of, row))[:40]!r}, hidden" for row, line in each if line in hidden
     )
     kept = [one for one in each if one[1] not in hidden]
-    return (
-        replace(sheet, rows=[row for row, _ in kept], lines=[line for _, line in kept], left_out=left)
-        if left
-        else sheet
-    )
+    rows, lines = [row for row, _ in kept], [line for _, line in kept]
+    return replace(sheet, rows=rows, lines=lines, left_out=left) if left else sheet
 
 
 def _excel_cell(value: Any) -> Cell:

@@ -26,12 +26,12 @@ from cmm_uq.jobs.importing.columns import SIGNS, by_extent, left_out_fact, settl
 from cmm_uq.jobs.importing.coordinates import EitherError, points_in, rows_of_axes
 from cmm_uq.jobs.importing.factors import codes, counted, hint
 from cmm_uq.jobs.importing.format import Fact, ImportKeys, NotReadError, Sheet, Sources, WrittenUnit, length_named
-from cmm_uq.jobs.importing.grouping import on_a_plate, places
+from cmm_uq.jobs.importing.grouping import on_a_plate, places, scattered
 from cmm_uq.jobs.importing.header import Header, is_summary, shown
 from cmm_uq.jobs.importing.lengths.axis_runs import axis_in
 from cmm_uq.jobs.importing.lengths.circles import circles_in
 from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
-from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, sums_of, take_certified
+from cmm_uq.jobs.importing.lengths.evidence import few_of, passes_over_axes, refuse_certificate, sums_of, take_certified
 from cmm_uq.jobs.importing.lengths.length_columns import lengths_in
 from cmm_uq.jobs.importing.lengths.line_labels import lengths_of, lines_and_runs
 from cmm_uq.jobs.importing.lengths.placing import Elsewhere, place_of_axis, said_elsewhere, stated_places, words_beside
@@ -281,21 +281,13 @@ class Understanding:
         if not stated and (unit := unit_elsewhere(self.sheets, small=False)) is not None:
             stated = [(unit, say("the only one that the file mentions"))]
         small = self.reading.small or unit_elsewhere(self.sheets, small=True)
-        if not stated and small is not None and self.reading.kind != "points":
+        figures, points = np.array(self.reading.figures).T, self.reading.kind == "points"
+        if not stated and small is not None:
+            if points and all(unit_of([one]) != small for one in self.reading.unused(self.grid, self.header, ())):
+                what = f"the file mentions {small.name} alone, which may be the unit of the places"
+                raise NotReadError(what, where=where, fix=f'Say unit = "{small.name}", or unit = "mm"')
             system = formats.UNITS["inch" if small.name == "microinch" else "mm"]
             stated = [(system, say("as its deviations are in {unit}", unit=Verbatim(small.name)))]
-        figures, points = np.array(self.reading.figures).T, self.reading.kind == "points"
-        beside = self.reading.unused(self.grid, self.header, ()) if points else []
-        if points and not stated and small is not None and any(unit_of([one]) == small for one in beside):
-            stated = [
-                (
-                    formats.UNITS["inch" if small.name == "microinch" else "mm"],
-                    say("as its deviations are in {unit}", unit=Verbatim(small.name)),
-                )
-            ]
-        elif points and not stated and small is not None:
-            what = f"the file mentions {small.name} alone, which may be the unit of the places"
-            raise NotReadError(what, where=where, fix=f'Say unit = "{small.name}", or unit = "mm"')
         largest = float(np.nanmax(np.ptp(figures, axis=1) if points else figures))
         if points and not on_a_plate(figures.T[np.unique(places(figures.T), return_index=True)[1]]):
             largest = min(largest, _AIRCRAFT)
@@ -344,6 +336,8 @@ class Understanding:
             what = "its lengths are of several sizes, and no column says what each of them is of"
             raise NotReadError(what, where=place, fix="Say which does: columns = { reference_mm = … }, or nominal_mm")
         lines, runs, used = lines_and_runs(own.every_label, lengths, place, stated)
+        if not keys.columns and {*lines} == {"1"} and runs.max() == 1:
+            refuse_certificate(own, self.header.headings, place)
         reference, measured = (formats.converted(one, unit, "length_mm") for one in figures.T)
         if own.deviations:
             said_mm = formats.UNITS["mm"] if "deviation_mm" in keys.columns else None
@@ -386,6 +380,11 @@ class Understanding:
             labels = self.reading.every_label
             spheres = table_spheres(labels, xyz, self.sheets, self.grid.sign, where)
             numbers, facts = (spheres, []) if spheres else numbered_points(labels, xyz, keys, where)
+            alone = keys.points_per_measurement is None and not {*numbers.get("repeat", ())}
+            if self.reading.bare and alone and not np.ptp(numbers["measurement"]) and scattered(xyz):
+                raise NotReadError(
+                    "nothing says that they are one measurement", where=where, fix='points_per_measurement = "all"'
+                )
         except NotReadError as error:
             if not self.reading.bare:
                 raise

@@ -20,16 +20,7 @@ from cmm_uq.jobs.importing.cells.encodings import report_lines
 from cmm_uq.jobs.importing.reports import statements
 from cmm_uq.jobs.part import drawing as drawings, feature as refused
 from cmm_uq.jobs.part.checks import BETWEEN
-from cmm_uq.jobs.part.drawing import (
-    PROGRAMS,
-    Drawing,
-    Facts,
-    NotUnderstood,
-    NotUnderstoodError,
-    numbers_of,
-    reference,
-    words_of,
-)
+from cmm_uq.jobs.part.drawing import Drawing, Facts, NotUnderstoodError, numbers_of, reference, words_of
 from cmm_uq.jobs.part.feature import ASKS, What
 
 MILLIMETRES = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FEET": 304.8}
@@ -39,9 +30,9 @@ KINDS = {name.upper(): name for name in ("point", "line", "plane", "circle", "sp
 NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
 
 # first words of statements that say nothing of what is measured, or that are read elsewhere
-PASSED = frozenset(PROGRAMS["dmis"]["passed"].split())
+PASSED = frozenset(drawings.PROGRAMS["dmis"]["passed"].split())
 
-_TOLERANCES: Mapping[str, What] = PROGRAMS["dmis"]["tolerances"]
+_TOLERANCES: Mapping[str, What] = drawings.PROGRAMS["dmis"]["tolerances"]
 
 # words that change what a tolerance means, refused in words of their own
 _REFUSED: Mapping[str, str] = {
@@ -173,7 +164,7 @@ class _Program:
             raise NotUnderstoodError(f"is a statement {of}(…)={major}/, which is not read")
 
     def _unknown(self, name: str, why: str, place: str = "") -> None:
-        self.drawing.unknown.append(NotUnderstood(name, why, place or self.place))
+        self.drawing.unknown.append(drawings.NotUnderstood(name, why, place or self.place))
 
     def _units(self, words: list[str]) -> None:
         length, angle = (*words, "ANGDEC")[:2]

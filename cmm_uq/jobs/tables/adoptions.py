@@ -99,14 +99,8 @@ def taken_for(name: str, adoption: Adoption) -> tuple[Text, ...]:
     """What a certificate says of a national name."""
     if adoption.source is None:
         return ()
-    return (
-        say(
-            "{name} is taken for the adoption of {standard}: {source}.",
-            name=Verbatim(name),
-            standard=Verbatim(adoption.name),
-            source=adoption.source,
-        ),
-    )
+    own, of, by = Verbatim(name), Verbatim(adoption.name), adoption.source
+    return (say("{name} is taken for the adoption of {standard}: {source}.", name=own, standard=of, source=by),)
 
 
 def nearest(name: str, known: Collection[str]) -> str:

@@ -12,19 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
+from cmm_uq.base.files import table as forms
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import (
-    LARGEST_UM,
-    RISING,
-    JobTable,
-    Limit,
-    Positive,
-    Temperature,
-    Uncertainty,
-    at_least,
-    key,
-    required,
-)
+from cmm_uq.base.files.table import LARGEST_UM, JobTable, Limit, Positive, Uncertainty, at_least, key, required
 from cmm_uq.base.messages import Text
 from cmm_uq.base.values import dataclass, field
 from cmm_uq.jobs.tables.adoptions import nearest
@@ -167,7 +157,7 @@ def key_of_line(line: str, *, angular: bool) -> str:
     return (LINE_KEYS | ANGULAR_KEYS if angular else LINE_KEYS).get(line, line)
 
 
-Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2), RISING]
+Limits = Annotated[list[forms.Temperature], Field(min_length=2, max_length=2), forms.RISING]
 Kelvins = Annotated[float, Field(gt=0, le=1000)]
 
 

@@ -8,30 +8,12 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
+from cmm_uq.base.files import table as forms
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
-from cmm_uq.base.files.table import (
-    Column,
-    JobTable,
-    Length,
-    Limit,
-    Number,
-    Positive,
-    Range,
-    Temperature,
-    Triple,
-    Uncertainty,
-    key,
-    required,
-)
+from cmm_uq.base.files.table import JobTable, Length, Limit, Number, Range, Temperature, Triple, key, required
+from cmm_uq.jobs.tables import rotary_axes
 from cmm_uq.jobs.tables.arm import MOST_JOINTS, ArmFacts, JointFacts
-from cmm_uq.jobs.tables.rotary_axes import (
-    HeadFacts,
-    RotaryErrorsFile,
-    RotaryFacts,
-    RotaryTableFacts,
-    check_carriages,
-    rotary_problems,
-)
+from cmm_uq.jobs.tables.rotary_axes import HeadFacts, RotaryErrorsFile, RotaryFacts, RotaryTableFacts
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 Months = Annotated[int, Field(ge=1, le=600)]
@@ -67,7 +49,7 @@ SHORTEST_TRAVEL_MM = 1e-3  # positions are divided by the travel
 Angle = Annotated[float, Field(ge=-36_000, le=36_000)]  # A squareness error, ″: ten degrees
 Turn = Annotated[float, Field(ge=-360, le=360)]  # an angle of a pose, °
 
-Sensors = Annotated[list[Column], Field(min_length=1, max_length=COLUMNS.most)]
+Sensors = Annotated[list[forms.Column], Field(min_length=1, max_length=COLUMNS.most)]
 """Columns of the thermocouples on one scale."""
 
 
@@ -109,7 +91,7 @@ class ErrorMapFile(JobTable):
     squareness_arcsec: SquarenessFacts | None = key(None, "Squareness of the axes at that temperature.")
     covariance: str | None = None
     """Factor F of the covariance F·Fᵀ of the map's figures, as an `.npy` file that `compensate --new-map` writes."""
-    u_beside_um: Annotated[list[Uncertainty], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
+    u_beside_um: Annotated[list[forms.Uncertainty], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]
     """Standard uncertainties along x, y and z of errors that the map does not hold, beside its covariance."""
 
     def problems(self) -> Iterator[str]:
@@ -147,7 +129,7 @@ class TemperatureLogFile(JobTable):
     start: dt.datetime | None = key(None, "Moment at which the recording's `time_s` was 0, for a log that gives dates.")
     columns: ScaleColumns | None = None
     """Columns of the thermocouples on each scale, where their names do not say so."""
-    max_gap_s: Positive | None = key(None, "Longest interval of the log that is interpolated over.")
+    max_gap_s: forms.Positive | None = key(None, "Longest interval of the log that is interpolated over.")
 
 
 class Pose(JobTable):
@@ -288,8 +270,8 @@ class MachineFacts(JobTable):
     def problems(self) -> Iterator[str]:
         for file in [each.file for each in self.error_map if each.squareness_arcsec and self.squareness_arcsec]:
             yield f"squareness_arcsec is given for the machine and for the map {file!r}: leave out one of the two"
-        check_carriages(self.chain)
-        yield from rotary_problems(self.chain, self.rotary, self.table, self.head)
+        rotary_axes.check_carriages(self.chain)
+        yield from rotary_axes.rotary_problems(self.chain, self.rotary, self.table, self.head)
         if self.rotary_errors and not set(self.chain) & set("-|"):
             yield "rotary_errors are of a machine with rotary axes: name an error_map, or mend the chain"
         own = _OF_ARMS if self.joint else _OF_ARMS | {"origin_mm"}
@@ -306,12 +288,8 @@ class MachineFacts(JobTable):
             yield "[machine.arm] home is of screw axes, and joints are rows: leave it out, or give direction and point_mm"
         if screws and "convention" in self.arm.model_fields_set:
             yield "[machine.arm] convention is of rows, and joints are screw axes: leave it out"
-        if (
-            self.joint
-            and not screws
-            and not any((one.a_mm, one.d_mm) != (0, 0) for one in self.joint)
-            and not any(self.arm.tool_mm)
-        ):
+        rows = self.joint and not screws and not any(self.arm.tool_mm)
+        if rows and not any((one.a_mm, one.d_mm) != (0, 0) for one in self.joint):
             yield "no [[machine.joint]] has a length, and the tool is on the last: give a_mm and d_mm of its rows"
         if not self.joint and self.arm.model_fields_set - ({"reach_mm", "up"} if self.is_arm else set()):
             yield "[machine.arm] is of an arm: give its rows, [[machine.joint]], or of one whose joints are not read reach_mm"

@@ -11,24 +11,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
+from cmm_uq.base.files import table as forms
 from cmm_uq.base.files.limits import COLUMNS, LISTED
-from cmm_uq.base.files.table import (
-    RISING,
-    AnyFloat,
-    Column,
-    JobTable,
-    Length,
-    Names,
-    Pair,
-    Position,
-    Range,
-    Triple,
-    Uncertainty,
-    Unit,
-    at_least,
-    key,
-    required,
-)
+from cmm_uq.base.files.table import Column, JobTable, Length, Triple, Uncertainty, Unit, at_least, key, required
 from cmm_uq.base.messages import Text, Verbatim
 
 Criterion = Literal["separation", "D", "A", "worst"]
@@ -54,7 +39,7 @@ class FixtureFacts(JobTable):
     directions: Annotated[list[Direction], Field(max_length=LISTED.most)] = []
     """Directions in which a bar or gauge can be held, either way along it, or normals of a plate or triangle; any
     without them."""
-    heights_mm: Pair | None = key(None, "Lowest and highest z reading of the artefact's middle.")
+    heights_mm: forms.Pair | None = key(None, "Lowest and highest z reading of the artefact's middle.")
 
     def problems(self) -> Iterator[str]:
         if any(not any(direction) for direction in self.directions):
@@ -82,7 +67,9 @@ class PosesFacts(JobTable):
 
     obstacle: Annotated[list[ObstacleFacts], Field(max_length=LISTED.most)] = []
     """Boxes that no link, no joint and no tool may enter, and that hide the reflector."""
-    floor_mm: Position | None = key(None, "Height along z of the base's frame below which nothing that moves goes.")
+    floor_mm: forms.Position | None = key(
+        None, "Height along z of the base's frame below which nothing that moves goes."
+    )
     clearance_mm: Annotated[float, Field(ge=0, le=1e4)] = 50.0
     """How far links, which are taken as lines, keep from floor and boxes, and a beam from links."""
     station_mm: Triple | None = key(
@@ -109,7 +96,7 @@ class PlanFacts(JobTable):
 
     ready: str | None = None
     """Name of the ready plan to start from; the usual one of the kind where it is left out."""
-    volume_mm: dict[Literal["x", "y", "z"], Range] = {}
+    volume_mm: dict[Literal["x", "y", "z"], forms.Range] = {}
     """Scale readings that points may have; the machine's travel, else the recorded range."""
     margin_mm: Annotated[float, Field(ge=0, le=1e6)] = key(10.0, "Kept free at each end of that range.")
     fixtures: FixtureFacts = FixtureFacts.left_out("How the artefact may stand.")
@@ -125,9 +112,9 @@ class PlanFacts(JobTable):
     both_ways: bool | None = None
     """Whether faces of a gauge are met on the way back too; the ready plan of ISO 10360-2 does so by default."""
     repeats: Annotated[int, Field(ge=1, le=20)] = key(3, "How often each point is measured.")
-    rivals: Names | None = None
+    rivals: forms.Names | None = None
     """Effects that may act and are not named in the model; by default all linear ones that these columns could show."""
-    columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
+    columns: Annotated[dict[Column, forms.AnyFloat], Field(max_length=COLUMNS.most)] = {}
     """Further columns of the recording at a constant value, such as temperatures."""
     unseen: bool | None = None
     """Whether what a diagnosis says to measure next shall also show what the recording could not have shown; by default where
@@ -213,7 +200,7 @@ class ProveFacts(JobTable):
 
     false_alarms_pct: Annotated[float, Field(gt=0, lt=100)] = 2.0
     """Largest rate of false alarms, in percent of the recordings that hide nothing."""
-    coverage_pct: Annotated[list[Percent], Field(min_length=2, max_length=2), RISING] = [93.0, 97.0]
+    coverage_pct: Annotated[list[Percent], Field(min_length=2, max_length=2), forms.RISING] = [93.0, 97.0]
     """Lowest and highest percentage of 95 % intervals that hold the truth."""
     wrong_names_pct: Annotated[float, Field(gt=0, lt=100)] | None = None
     """Largest percentage of recordings in which an effect is named that does not act."""

@@ -169,10 +169,10 @@ def test_distances_of_a_dmis_output_are_lengths() -> None:
 
 
 def test_names_of_lengths_are_not_taken_for_lines() -> None:
-    """Each of them has one length alone, along X and along Y, so that a line would have no other."""
+    """Each of them has one length alone, none says an axis, so that a line would have no other."""
     body = [
-        f"T(D{axis}{n:.0f}_{r})=TOL/DISTB,NOMINL,{n},-0.002,0.002,{axis}AXIS\n"
-        f"TA(D{axis}{n:.0f}_{r})=TOL/DISTB,{n + ERRORS[k % 3][r - 1] / 1000:.5f},INTOL,{axis}AXIS\n"
+        f"T(D{axis}{n:.0f}_{r})=TOL/DISTB,NOMINL,{n},-0.002,0.002,PT2PT\n"
+        f"TA(D{axis}{n:.0f}_{r})=TOL/DISTB,{n + ERRORS[k % 3][r - 1] / 1000:.5f},INTOL,PT2PT\n"
         for axis in "XY"
         for r in (1, 2, 3)
         for k, n in enumerate((60.0, 180.0, 300.0, 420.0))

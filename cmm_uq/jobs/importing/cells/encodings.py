@@ -39,6 +39,8 @@ _ALPHABETS = {"cp1252": _WESTERN, "cp1250": _EASTERN, "cp1254": "çğıiöşüâ
 _ALPHABETS |= {"cp1253": "αβγδεζηθικλμνξοπρστυφχψωςάέήίόύώϊϋΐΰ"}
 _ALPHABETS |= {"cp850": _WESTERN, "cp852": _EASTERN, "cp866": _CYRILLIC}
 _LAST_LATIN = "\u024f"
+# of Arabic and Persian, and their signs of decimals and thousands
+_FIGURES = {**{first + k: str(k) for first in (0x660, 0x6F0) for k in range(10)}, 0x66B: ".", 0x66C: "\u202f"}
 _SIGNS = {*"µμ°±²³«»–—„“”‚‘’…·×÷§©®€ΔΩ∅≤≥¼½¾¹ªº†•™\u00a0\u202f\ufeff"}
 _DIAMETER = re.compile(r"(?<![^\W\d_])Ø(?![^\W\d_])")
 _WITHIN = re.compile(r"(?<=[^\W\d_])[³²¹¿¾¼½ªº](?=[^\W\d_])")  # a word, in which signs are letters of another encoding
@@ -70,7 +72,7 @@ def decoded(content: bytes, where: str, asked: str | None = None) -> tuple[str, 
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
         raise CmmUqError("has zero bytes in it: it is damaged, or no text", where=f"{where} line {line}", fix=_FIX)
-    return text, title
+    return text if text.isascii() else text.translate(_FIGURES), title
 
 
 def _without_mark(content: bytes) -> str:

@@ -90,11 +90,8 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     taken = rows | {r for one in readings for r in one.others}
     summed = {r for one in readings for r in one.summaries}
     heads, last = {row for block in grid.blocks for row in block.head}, max(taken)
-    texts = [
-        row
-        for row in range(min(taken), last)
-        if grid.kinds[row] == "text" and not (grid.names_line(row) or grid.place(row))
-    ]
+    texts = [row for row in range(min(taken), last) if grid.kinds[row] == "text"]
+    texts = [row for row in texts if not (grid.names_line(row) or grid.place(row))]
     cells = (cell for row in (*rows, *texts) for cell in grid.sheet.rows[row])
     if any(isinstance(cell, str) and _SEVERAL.search(_BRACKETS.sub("", cell)) for cell in cells):
         return None  # cells that were not cut apart

@@ -128,11 +128,8 @@ def _lines(form: Format, content: bytes, where: str, keys: FileKeys) -> Iterator
 
 def _plain(form: str, text: str) -> str:
     if form in ("html", "qif", "xml", "dcc"):
-        text = re.sub(
-            r"</t[dh]\s*>|<(?!/)([\w:]{1,40})[^<>]{0,200}>",
-            lambda of: f"\t{of[1]}: " if of[1] and form != "html" else "\t",
-            text,
-        )
+        begun = r"</t[dh]\s*>|<(?!/)([\w:]{1,40})[^<>]{0,200}>"
+        text = re.sub(begun, lambda of: f"\t{of[1]}: " if of[1] and form != "html" else "\t", text)
         text = re.sub(r"</?[^<>]{1,200}>", "\t", text)
         return text.replace("&nbsp;", " ").replace("&deg;", "°")
     return text.replace('"', "").replace(": ", ":\t") if form == "json" else text

@@ -7,17 +7,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing import factors, format as units
 from cmm_uq.jobs.importing.cells.figures import unit_elsewhere
 from cmm_uq.jobs.importing.factors import LINE, RUN, Label
 from cmm_uq.jobs.importing.format import UNITS, NotReadError, Sheet, length_named
 from cmm_uq.jobs.importing.lengths.deviation_sign import turned_by
 from cmm_uq.jobs.importing.lengths.placing import DIAGONAL
-from cmm_uq.jobs.importing.lines import AxisRun
+from cmm_uq.jobs.importing.lines import LEAST_UM, AxisRun
 from cmm_uq.jobs.importing.roles import SheetReading
 
 _MILLIMETRES = 0.2  # deviations at targets that are all smaller may be in mm
-_FINEST_UM, _LEAST_UM = 0.002, 0.05  # finer and smaller than machines are known in µm: these are in the unit of targets
+_FINEST_UM = 0.002  # finer than machines are known in µm, where all are smaller than the least: in the unit of targets
 
 
 def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> list[AxisRun]:
@@ -32,37 +33,27 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     small = unit if reading.positions else reading.small or unit_elsewhere(sheets, small=True)
     small = small or length_named(sheets[0].unit or "")
     most, finest = np.abs(figures[:, 1]).max(), min(c.step for c in reading.taken["reading_um"])
-    if small is None and finest < _FINEST_UM and most < _LEAST_UM:
+    if small is None and finest < _FINEST_UM and most < LEAST_UM:
         small = stated
     if small is None and most < _MILLIMETRES:
         fix = "Write it above them: (µm) or (mm)"
         raise NotReadError("nothing says the unit of the deviations: µm or mm", where=where, fix=fix)
     target = units.converted(figures[:, 0], unit, "x_mm")
-    turn = not (reading.positions or reading.checked) and turned_by(
-        sheets, (c.heading for c in reading.taken["reading_um"]), where, targets=True
-    )
+    of_head = (c.heading for c in reading.taken["reading_um"])
+    turn = not (reading.positions or reading.checked) and turned_by(sheets, of_head, where, targets=True)
     deviation = units.converted(figures[:, 1], small or UNITS["um"], "reading_um") * (-1 if turn else 1)
-    named = [
-        [find(value) or find(f"{label.words} {value}") for value in label.values]
-        for find in (axis_in, letter_in)
-        for label in labels
-    ]
+    ways_to = [(find, label) for find in (axis_in, letter_in) for label in labels]
+    named = [[find(value) or find(f"{label.words} {value}") for value in label.values] for find, label in ways_to]
     axes = next((own for own in named if all(own)), _lines_of(labels) or [_axis_of(sheets)] * len(target))
     ways = factors.senses(labels, target.tolist())
-    parts = [
-        one for label in labels for one in (label, *factors.run_apart(label, lengths=True), *factors.parts_of(label))
-    ]
+    split = ((one, *factors.run_apart(one, lengths=True), *factors.parts_of(one)) for one in labels)
+    parts = [part for own in split for part in own]
     run = next((part for part in parts if factors.counted(part, lengths=True) == RUN and len({*part.values}) > 1), None)
     key = factors.codes([*zip(axes, ways or [0] * len(target), strict=True)])
-    numbers = (
-        factors.numbered_runs(run.values)
-        if run is not None
-        else factors.in_turn(factors.together(key, factors.codes(target.tolist())))
-    )
+    numbers = factors.in_turn(factors.together(key, factors.codes(target.tolist())))
+    numbers = numbers if run is None else factors.numbered_runs(run.values)
     if ways is None:  # by the order of their targets; none where all are listed in one order
-        ends = {n: target[numbers == n][[0, -1]] for n in np.unique(numbers).tolist()}
-        turns = {n: int(np.sign(last - first)) for n, (first, last) in ends.items()}
-        ways = [turns[n] if len({*turns.values()}) > 1 else 0 for n in numbers.tolist()]
+        ways, numbers = _by_order(key, target, numbers, where, numbered=run is not None)
     counts = [re.findall(r"\d+", value) for value in run.values] if run is not None else []
     if run is not None and {*map(len, counts)} == {1}:
         each = [*zip((one[0] for one in counts), ways, strict=True)]
@@ -76,6 +67,36 @@ def axis_runs(reading: SheetReading, sheets: Sequence[Sheet], where: str) -> lis
     if any(len({t for t, _, _ in run.targets}) < len(run.targets) for run in runs.values()):
         raise NotReadError("a run has a target twice", where=where, fix="Number the runs in a column")
     return list(runs.values())
+
+
+def _by_order(key: Ints, target: Floats, numbers: Ints, where: str, *, numbered: bool) -> tuple[list[int], Ints]:
+    """Sense of each target, by the order of those of its run, and number of the run, of its axis and sense if it has none."""
+    each = factors.together(key, numbers)
+    if not numbered and not all(_in_order(target[each == n]) for n in np.unique(each)):
+        each = _passes(key, target, where)  # in turn of time, some of whose targets were left out
+    ends = {n: (int(key[each == n][0]), *target[each == n][[0, -1]]) for n in np.unique(each).tolist()}
+    turns = {n: (axis, int(np.sign(last - first))) for n, (axis, first, last) in ends.items()}
+    both = len({way for _, way in turns.values()}) > 1
+    of = {n: sum(turns[m] == turns[n] for m in turns if m <= n) for n in turns}
+    return [turns[n][1] if both else 0 for n in each.tolist()], numbers if numbered else np.array([of[n] for n in each])
+
+
+def _in_order(targets: Floats) -> bool:
+    """Whether targets rise, or fall, from each to the next."""
+    steps = np.diff(targets)
+    return bool((steps > 0).all() or (steps < 0).all())
+
+
+def _passes(key: Ints, target: Floats, where: str) -> Ints:
+    """Number of the pass, from one end to the other, of each target in the order in which they were measured."""
+    numbers, first = np.zeros(len(target), dtype=np.int64), 0
+    for k in range(1, len(target)):
+        anew = key[k] != key[k - 1] or not _in_order(target[first : k + 1])
+        numbers[k], first = numbers[k - 1] + anew, k if anew else first
+    if 2 * np.bincount(numbers).min() <= np.bincount(numbers).max():
+        what = "its targets neither rise nor fall throughout a run"
+        raise NotReadError(what, where=where, fix="Number the runs in a column: run")
+    return numbers
 
 
 def _lines_of(labels: Sequence[Label]) -> list[str]:

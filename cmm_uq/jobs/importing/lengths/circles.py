@@ -138,11 +138,8 @@ def circles_of(reading: SheetReading, sheets: Sequence[Sheet], grid: CutSheet, w
         if plane in ("", "XZ", "YX", "ZY"):  # of which nobody knows where its angles begin, and which way they go
             what = f"nothing says the {'way of angles in the ' if plane else ''}plane of the circle"
             raise NotReadError(what, where=where, fix='Write it above, as its angles go: "Plane;XY", "YZ" or "ZX"')
-        sense = (
-            sense_of(of_head)
-            or sense_of(key)
-            or sense_of(c.heading for c in reading.taken["reading_um"]) * (len(reading.source) == 1)
-        )
+        of_column = sense_of(c.heading for c in reading.taken["reading_um"]) * (len(reading.source) == 1)
+        sense = sense_of(of_head) or sense_of(key) or of_column
         rising = int(np.sign(np.median(np.diff(angles))))
         if sense and sense != rising and len(reading.source) == 1:
             what = "angles of a clockwise round rise, or of the other fall, and may be counted the way that it goes"
@@ -181,13 +178,9 @@ def _radius(grid: CutSheet, first: int, where: str) -> float:
             last = (words or ("",))[-1]  # as Teststraal, in which the word stands behind another
             said = any(f" {one} " in ahead or (len(one) > len("sade") and last.endswith(one)) for one in known)
             unit = unit_of([match[1]]) or unit_named(match[3]) or UNITS["mm"]
-            if (
-                said
-                and own is not None
-                and unit.sort == LENGTH
-                and _LEAST_MM <= own[0] * unit.metres * 1000 < _LARGEST_MM
-            ):
-                return own[0] * unit.metres * 1000
+            size = own[0] * unit.metres * 1000 if said and own is not None and unit.sort == LENGTH else 0.0
+            if _LEAST_MM <= size < _LARGEST_MM:
+                return size
     raise NotReadError("nothing says the radius of the circle", where=where, fix='Write it above: "Radius (mm);150"')
 
 

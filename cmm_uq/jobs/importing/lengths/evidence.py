@@ -14,10 +14,13 @@ import numpy as np
 
 from cmm_uq.jobs.importing.blocks import CutSheet
 from cmm_uq.jobs.importing.factors import numberless, way_of
+from cmm_uq.jobs.importing.format import NotReadError
+from cmm_uq.jobs.importing.header import plain_words, understood, words_of
 from cmm_uq.jobs.importing.roles import FigureColumn, SheetReading, columns_in, each, like, said
 
 _PART = 4  # of the figures of a turned sheet, the least that is read
 _MANY = 12  # rows in which no run is the largest, or the mean, of others by chance
+_UNCERTAIN = ("reference_u_um", "reference_U_um")
 _LEAST = 4  # rows by which a column is known to follow from another
 
 
@@ -156,6 +159,16 @@ def _certified(grids: Sequence[CutSheet]) -> dict[float, tuple[float, str]]:
                 found.setdefault(one, set()).add((of_it, name))
     alone = all(len({value for value, _ in own}) == 1 for own in found.values())
     return {nominal: own.pop() for nominal, own in found.items()} if alone else {}
+
+
+def refuse_certificate(reading: SheetReading, heads: Sequence[str], where: str) -> None:
+    """Nominal lengths, each with one value and its uncertainty, of no line and no run, are calibrated and not measured."""
+    words = words_of("others")["uncertainty"]
+    certain = (understood(head).column in _UNCERTAIN or not words.isdisjoint(plain_words(head)) for head in heads)
+    if len(reading.source) == 1 and len(reading.figures) >= _LEAST and any(certain):
+        what = "gives each nominal length one with its uncertainty, on no line, in no run, as the certificate of a gauge does"
+        fix = 'Name it as [artefact.certificate] file, or say columns = { nominal_mm = "…", length_mm = "…" } of a test'
+        raise NotReadError(what, where=where, fix=fix)
 
 
 def few_of(reading: SheetReading, grid: CutSheet, rows: Sequence[int]) -> bool:

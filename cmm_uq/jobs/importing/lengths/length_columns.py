@@ -79,7 +79,8 @@ def _fill_down(columns: Sequence[FigureColumn]) -> None:
 
 def _in_micrometres(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
     """Columns, with deviations relative to a length as what they are of the only one beside them."""
-    bases = [c for c in columns if c.role in BASES and c.may_be_length and not c.minute]
+    bases = [c for c in columns if c.role in (*BASES, None) and c.may_be_length and not c.minute]
+    bases = [c for c in bases if c.role] or [c for c in bases if c.is_length]
     if len(bases) != 1 or any(c.role == "deviation" and c.may_be_length for c in columns):
         return [*columns]
     metres = bases[0].values * (bases[0].unit or UNITS["mm"]).metres
@@ -163,11 +164,8 @@ def _base(
     elif base is None and named and measured and any(c.step < 1 for c in open_):
         return None  # which of both is calibrated nobody says
     base = base or next(iter((*named, *(again if not fine else ()))), None)
-    if (
-        base is None
-        and len(group) == len(open_) == 1
-        and any(c.deviates and not evidence.steady(group[0], c) for c in small)
-    ):
+    alone = base is None and len(group) == len(open_) == 1
+    if alone and any(c.deviates and not evidence.steady(group[0], c) for c in small):
         base = open_[0]
     elif base is None and open_ and len(group) > len(open_):
         return None
@@ -178,9 +176,25 @@ def _base(
     rest = [c for c in group if c is not base and (c not in named or (base is not None and evidence.scatters(c, base)))]
     rest = [c for c in rest if c.role == "measured" or base is None or c.step < min(1, 20 * base.step)]
     rest = [c for c in rest if c.role == "measured"] or [c for c in rest if base is None or not follows(c, base)]
-    own = [c for c in rest if any(c is a and b is base for _, a, b in pairs)]
+    own = [c for c in rest if base and any({a.i, b.i} == {c.i, base.i} for _, a, b in pairs)]
     rest = own if len(own) == 1 and not side_by_side(rest) else rest  # what is not corrected has no deviation
     return base, without_derived(rest) or rest
+
+
+def _call_reference(group: Sequence[FigureColumn], columns: Sequence[FigureColumn], where: str) -> None:
+    """Of ``Nominal``, ``Actual``, ``Run 1`` and on the second is calibrated, where the mean error says so; else it asks."""
+    runs = max(families(group), key=len)
+    lone = [c for c in group if c not in runs and c.role == "measured" and not c.sums_up(runs, worst=True)]
+    if len(runs) < len("12") or len(lone) != 1 or lone[0].stated or any(c.role == "reference" for c in group):
+        return
+    nominal = [c for c in group if c.role in BASES]
+    errors = [c for c in columns if c not in group and c.role in ("summary", "deviation")]
+    of = [c for c in (*lone, *nominal) if any(_stands(d, runs, c, f) for d in errors for f in d.factors(c))]
+    if side_by_side(runs) and of and of[0] is lone[0]:  # printed finer than what is nominal
+        lone[0].role = "reference"
+    elif side_by_side(runs) and nominal and not of and not any(follows(lone[0], c) for c in nominal):
+        what = f"{lone[0].heading!r} beside {runs[0].heading!r} may be calibrated, or measured"
+        raise NotReadError(what, where=where, fix=said_by("reference_mm", lone, ", or leave it out"))
 
 
 def _lengths(
@@ -191,6 +205,7 @@ def _lengths(
     least = max(0.01 * most, 0.2)
     little = [c for c in small if not c.counts and (np.nanmax(np.abs(c.values)) < least or np.nanmin(c.values) < 0)]
     small = [c for c in small if c.deviates or c in little]
+    _call_reference(group, columns, grid.at(rows[0]))
     if (found := _base(group, small, grid.at(rows[0]))) is None:
         return None
     base, source = found
@@ -259,8 +274,8 @@ def _plain(
     every = all(c.named for c in source) or (len(lone) == 1 and base.role is not None)
     every = every or (len(source) > 1 and all(c.minute for c in source) and side_by_side(source))
     # columns that are numbered, near a reference and other wherever it comes again, as no calibration is
-    every = every or (len(source) > 1 and side_by_side(source) and all(evidence.scatters(c, base) for c in source))
-    return bool(checked) or (base.named and every)
+    other = len(source) > 1 and side_by_side(source) and all(evidence.scatters(c, base) for c in source)
+    return bool(checked) or other or (base.named and every)
 
 
 def side_by_side(columns: Sequence[FigureColumn]) -> bool:
@@ -291,11 +306,8 @@ def summed_up(columns: Sequence[FigureColumn]) -> list[FigureColumn]:
     for size in range(len(fine) - 1, 1, -1) if len(fine) and len(fine[0].values) >= _LEAST_ROWS else ():
         for k in range(len(fine) - size):
             own, after = fine[k : k + size], fine[k + size]
-            if (
-                own[-1].i - own[0].i == size - 1
-                and after.sums_up(own)
-                and not any(o.sums_up(own[:j]) for j, o in enumerate(own) if j > 1)
-            ):
+            beside = own[-1].i - own[0].i == size - 1 and after.sums_up(own)
+            if beside and not any(o.sums_up(own[:j]) for j, o in enumerate(own) if j > 1):
                 return own
     return []
 

@@ -79,12 +79,19 @@ def lines_and_runs(
         what = "lengths of one line and one run have the same nominal length"
         fix = 'Say what tells them apart: columns = { line = "…", repeat = "…" }'
         raise NotReadError(what, where=place, fix=fix)
+    if run is not None and counts_on(run[1], key):
+        run = None  # a serial number, from line to line
     names = [" ".join(dict.fromkeys(parts)) for parts in zip(*(f[0].values for f in line), strict=True)]
     titles = [one for one in labels if one.sort == "title" and counted(one, lengths=True) == LINE]
     titled = [one.values[0] for one in labels if one.values[0] and (one.sort == "sheet" or one in titles)]
     numbers = factors.in_turn(key) if run is None else factors.numbered_runs(run[0].values)
     used = [f[0].words for f in (*line, *([run] if run else []))]
     return names or [titled[-1] if titled else "1"] * count, numbers, used
+
+
+def counts_on(repeat: Ints, key: Ints) -> bool:
+    """Whether numbers of repeats go on from one thing to the next: more than twice as many as anything was measured."""
+    return len(np.unique(repeat)) > 2 * int(np.unique(key, return_counts=True)[1].max(initial=1))
 
 
 def _of_rings(found: Sequence[Counted], line: list[Counted]) -> list[Counted]:
@@ -108,7 +115,8 @@ def _says_places(label: Label) -> bool:
     values = {*label.values}
     if label.sort == "part":
         return len(axes := {*map(letter_in, values)}) > 1 and "" not in axes
-    return label.sort in ("title", "column") and any(map(says_figures, values))
+    lettered = label.sort == "column" and len(values & {*"XYZ"}) > 1  # whatever the word above them
+    return label.sort in ("title", "column") and (lettered or any(map(says_figures, values)))
 
 
 def _is_of(one: Counted, lying: Ints) -> bool:

@@ -123,15 +123,9 @@ def without_place(text: str, sign: str) -> str:
     first = next(iter(_figures(text, sign)), None)
     ahead = text if first is None else text[: first[0]]
     words = [*re.finditer(r"[^\W\d_]+", ahead)][-_LAST:]
-    k = next(
-        (
-            k
-            for k, word in enumerate(words)
-            if role_of(word[0]) and (len(word[0]) > 2 or not word[0].isascii() or word is words[-1])
-        ),
-        None,
-    )
-    return (ahead if k is None else ahead[: words[k].start()]).rstrip(" \t:;,([-–—=")
+    roles = (word for word in words if role_of(word[0]))
+    role = next((word for word in roles if len(word[0]) > 2 or not word[0].isascii() or word is words[-1]), None)
+    return (ahead if role is None else ahead[: role.start()]).rstrip(" \t:;,([-–—=")
 
 
 def said_in(texts: Iterable[str], sign: str = ".") -> Said:
