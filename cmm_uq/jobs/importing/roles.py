@@ -19,7 +19,7 @@ from cmm_uq.jobs.columns import COORDINATES, OPTIONAL
 from cmm_uq.jobs.importing.blocks import DATED, Block, CutSheet, heading
 from cmm_uq.jobs.importing.cells.figures import SMALL, unit_of
 from cmm_uq.jobs.importing.factors import LINE, Label, hint
-from cmm_uq.jobs.importing.format import LENGTH, UNITS, WrittenUnit, converted, sort_of, unit_named
+from cmm_uq.jobs.importing.format import LENGTH, UNITS, NotReadError, WrittenUnit, converted, sort_of, unit_named
 from cmm_uq.jobs.importing.header import WORD, Header, plain_words, understood, unspaced, without_unit, words_of
 from cmm_uq.jobs.importing.lengths.places import DIRECTION
 
@@ -32,6 +32,7 @@ _OF_NAMES: Mapping[Role, str] = {
 _ROLES = {name: role for role, names in _OF_NAMES.items() for name in names.split()}
 _CLAIMS: Mapping[Role, tuple[Role, ...]] = {"reference": ("reference", "nominal", "target")}
 _ABBREVIATED = re.compile(r"[^\W\d_]{4,}(?=\.)")
+_DEGREES, _SECONDS = re.compile(r"°(?![CFcf])|\bdeg\b"), re.compile(r"[\[(][\"″][\])]|\barc ?sec")
 _RELATIVE = re.compile(
     r"(?i)(?<![^\W_])ppm(?![^\W_])|[µμu]m ?/ ?m(?![^\W_])|мкм ?/ ?м(?![^\W_])"
 )  # to a length, and none itself
@@ -293,6 +294,11 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
             role = _ROLES.get(name, "summary" if name or role in claimed else role)
             unit = unit or (UNITS[name[-2:]] if name.startswith("deviation_") else None)
         found.append(FigureColumn(i, path, values, float(min(steps[np.isfinite(values)])), unit, role, name in _ROLES))
+    heads = [" ".join(one.path) for one in found]
+    if heads and not grid.keys and _DEGREES.search(heads[0]) and any(map(_SECONDS.search, heads)):
+        what = "angles in ° beside readings in seconds of arc: of a rotary table or an angular run, and no lengths"
+        fix = "Write them as a recording of a polygon (docs/reference/columns.md); where they are inches, say it by columns"
+        raise NotReadError(what, where=grid.sheet.at("", rows[0], 0, heads[0]).removeprefix(": ").strip(), fix=fix)
     _deny_summaries(found)
     for c, after in pairwise(found):  # below one head over several columns
         alike = (

@@ -181,6 +181,28 @@ def test_names_of_lengths_are_not_taken_for_lines() -> None:
         lengths("DMISMN/'E0',05.3\nUNITS/MM,ANGDEC\n" + "".join(body), "x.dmo")
 
 
+@pytest.mark.parametrize("unit", ['["]', "[arcsec]"])
+def test_seconds_of_arc_beside_degrees_are_no_inches(unit: str) -> None:
+    """A rotary table by ISO 230-2 (export as a laboratory has it): 0.11 seconds of arc were read as 2.8 mm along a line."""
+    heads = ";".join(f"Jízda {run} {way} {unit}" for run in (1, 2) for way in "+-")
+    rows = [f"{angle};0,{angle % 70 + 11};-0,48;-0,20;-0,81" for angle in range(0, 361, 30)]
+    with pytest.raises(NotReadError, match=r"angles in ° beside readings in seconds of arc"):
+        lengths(f"Otočný stůl\nPoloha [°];{heads}\n" + "\n".join(rows) + "\n")
+
+
+def test_half_of_the_balls_are_no_remarks() -> None:
+    """P1A and P1B of five bars: those called A were left out, and what is left was a measurement of five points."""
+    balls = [
+        f"FA(P{k}{end})=FEAT/SPHERE,OUTER,CART,{140 + 40 * k + dx}.0003,{150 + dy}.0002,{80 * k}.0001,25.0"
+        for k in range(1, 6)
+        for end, dx, dy in (("A", 0, 0), ("B", 180, 240))
+    ]
+    with pytest.raises(NotReadError, match="nothing says which points belong to one measurement"):
+        imported(
+            ("DMISMN/'E0',05.2\nUNITS/MM,ANGDEC\n" + "\n".join(balls) + "\nENDFIL\n").encode(), "b.dmo", ImportKeys()
+        )
+
+
 def test_places_measured_again_are_read_before_a_sheet_of_their_distances() -> None:
     at = {"A": (120.0, 80.0, 60.0), "B": (420.0, 480.0, 60.0)}
     rows = [",".join(map(str, (k, *(round(c + k / 5000, 4) for own in at.values() for c in own)))) for k in (1, 2, 3)]

@@ -99,13 +99,14 @@ def rows_left_out(readings: Sequence[SheetReading], grid: CutSheet) -> list[str]
     above = grid.sheet.rows[: min(taken)]  # of a table, and again above each further page of it
     again = {row for row in range(min(taken), len(grid.sheet.rows)) if grid.sheet.rows[row] in above}
     angles = below_angles(grid, grid.block_of)
-    first = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken)
+    first, alike = min(grid.block_of[row].rows[0] if row in grid.block_of else row for row in taken), 0
     told += [header.shown(grid.sheet, row, "a head again") for row in sorted(heads & again) if row < last]
     for row in range(len(grid.sheet.rows)):
         if grid.kinds[row] == "text" and first <= row < last and row not in heads:
             own = [grid.figure(row, k) for k in columns]
             figured = None not in own and any(f is not None and f[1] < 1 for f in own)
-            if figured and not (grid.lettered(row) or grid.place(row)):
+            alike += figured
+            if figured and (2 * alike >= len(rows) or not (grid.lettered(row) or grid.place(row))):
                 return None  # whatever else stands in it, it may be measured
             text = next(filter(None, (grid.text(row, k) for k in range(len(grid.sheet.rows[row])))), "")
             if hint(text, lengths=True) not in (LINE, RUN):  # else the title of a line or a run

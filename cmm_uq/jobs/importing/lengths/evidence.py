@@ -166,7 +166,7 @@ def refuse_certificate(reading: SheetReading, heads: Sequence[str], where: str) 
     words = words_of("others")["uncertainty"]
     certain = (understood(head).column in _UNCERTAIN or not words.isdisjoint(plain_words(head)) for head in heads)
     if len(reading.source) == 1 and len(reading.figures) >= _LEAST and any(certain):
-        what = "gives each nominal length one with its uncertainty, on no line, in no run, as the certificate of a gauge does"
+        what = "gives each nominal length a value with its uncertainty, no line and no run, as the certificate of a gauge does"
         fix = 'Name it as [artefact.certificate] file, or say columns = { nominal_mm = "…", length_mm = "…" } of a test'
         raise NotReadError(what, where=where, fix=fix)
 
