@@ -261,6 +261,10 @@ class MapCovariance:
             u[rows] = np.sqrt(np.einsum("nar,nar->na", root, root) + self.beside**2)
         return u
 
+    def of_distances(self, root: Floats, xyz: Floats, pairs: tuple[Ints, Ints]) -> Floats:
+        """As :func:`of_distances`, by R (n, 3, r)."""
+        return of_distances(root, np.broadcast_to(np.diag(self.beside), (len(xyz), 3, 3)), xyz, pairs)
+
 
 def of_distances(root: Floats, beside: Floats, xyz: Floats, pairs: tuple[Ints, Ints]) -> Floats:
     """Standard uncertainty (p,), mm, of distances between points (n, 3), mm, of which p pairs of rows are given.
