@@ -23,7 +23,7 @@ from tomlkit.items import AbstractTable
 from cmm_uq.analysis.conformity.standard import Characteristic
 from cmm_uq.analysis.conformity.standards import names, standard_named
 from cmm_uq.app.commands.forms import shipped
-from cmm_uq.app.commands.jobs.check import Problem, check_job, in_lines
+from cmm_uq.app.commands.jobs.check import JobCheck, Problem, check_job
 from cmm_uq.app.commands.jobs.exchange import offered, write_job_of_export
 from cmm_uq.app.commands.jobs.new import job_id, job_of_export, kind_or_refused, known, usual
 from cmm_uq.app.desk.exports import keys_of
@@ -227,6 +227,12 @@ def plain_number(text: str) -> str:
 
 def check_answers(kind: str, export: str, keys: Mapping[str, Any], values: Mapping[str, str]) -> dict[str, Any]:
     """What would be wrong with the job that a form begins, as ``cmm-uq check`` says it."""
+    said = _said(job_begun(kind, export, keys, values))
+    return said | {"problems": [_for_form(text, kind) for text in said["problems"]]}
+
+
+def job_begun(kind: str, export: str, keys: Mapping[str, Any], values: Mapping[str, str]) -> JobCheck:
+    """The job that a form begins, as ``cmm-uq check`` finds it."""
     wrong, path = Gathered(), Path(export)
     content = content_of(path, TABLE_BYTES, "Drop it again")
     with wrong.going_on():
@@ -241,10 +247,8 @@ def check_answers(kind: str, export: str, keys: Mapping[str, Any], values: Mappi
         }
         files = job_of_export(kind, tables, {path.name: content}, id="job")
         if not wrong.problems:
-            found = _checked("job", files)
-            return found | {"problems": [_for_form(text, kind) for text in found["problems"]]}
-    problems = [_for_form(text, kind) for text in in_lines([Problem.of(one) for one in wrong.problems])]
-    return {"problems": problems, "warnings": [], "sound": False}
+            return _checked("job", files)
+    return JobCheck("job", tuple(map(Problem.of, wrong.problems)), ())
 
 
 def _for_form(text: str, kind: str) -> str:
@@ -256,7 +260,7 @@ def _for_form(text: str, kind: str) -> str:
     return f"{text}. Here: {', '.join(unsaid)}" if unsaid else text
 
 
-def _checked(name: str, files: Mapping[str, bytes], beside: Path | None = None) -> dict[str, Any]:
+def _checked(name: str, files: Mapping[str, bytes], beside: Path | None = None) -> JobCheck:
     """What check says of a job of these files, and of those ``beside``, laid out in a folder of that name."""
     with tempfile.TemporaryDirectory(prefix="cmm-uq-") as place:
         if beside is not None:
@@ -267,7 +271,7 @@ def _checked(name: str, files: Mapping[str, bytes], beside: Path | None = None) 
                 target.parent.mkdir(parents=True, exist_ok=True)
                 target.unlink(missing_ok=True)  # what is linked is another's
                 target.write_bytes(content)
-            return check_text(name, None)
+            return check_job(Path(name))
 
 
 def _hidden(folder: str, names: list[str]) -> list[str]:
@@ -287,8 +291,11 @@ def check_text(job: str, text: str | None) -> dict[str, Any]:
     if text is not None:
         if len(text.encode()) > JOB_BYTES.most:
             raise CmmUqError("is longer than any job", where="job.toml", fix="Shorten it")
-        return _checked(job, {"job.toml": text.encode()}, Path(job))
-    found = check_job(Path(job))
+        return _said(_checked(job, {"job.toml": text.encode()}, Path(job)))
+    return _said(check_job(Path(job)))
+
+
+def _said(found: JobCheck) -> dict[str, Any]:
     problems, warnings = found.lines
     return {"problems": list(problems), "warnings": list(warnings), "sound": found.sound, "command": found.command}
 

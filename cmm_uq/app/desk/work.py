@@ -152,21 +152,22 @@ def kinds(export: str = "", keys: Mapping[str, Any] = MappingProxyType({})) -> l
     begun = {name: one.beginning(name) for name, one in kind.items() if one.table.with_recording}
     fits = dict.fromkeys(begun, (0, ""))
     if export and Path(export).stat().st_size <= _SMALL:
+        read = read_export(Path(export), exports.keys_of(keys))
+        calibrated = any(name.startswith("reference_") for name in read.columns)
         with tempfile.TemporaryDirectory(prefix="cmm-uq-") as place:
             own = Path(place, "readings.csv")
-            write_recording(Path(export), read_export(Path(export), exports.keys_of(keys)), own)
-            fits = {name: _fit(name, own) for name in begun}
+            write_recording(Path(export), read, own)
+            whole = {name: calibrated or not kind[name].table.with_references for name in begun}
+            fits = {name: _fit(name, own, whole=whole[name]) for name in begun}
     found = [[name, one.measured or one.title, one.numbering, *fits[name]] for name, one in begun.items()]
     return sorted(found, key=lambda one: int(one[3]))
 
 
-def _fit(kind: str, own: Path) -> tuple[int, str]:
-    problems = questions.check_answers(kind, str(own), {}, {"machine.name": "?", "job.date": "2000-01-01"})["problems"]
-    about = [
-        words.partition(". ")[0] for where, _, words in (one.partition(": ") for one in problems) if own.name in where
-    ]
-    lacks = not about or "no column 'reference_" in about[0]  # the calibration of the artefact, or keys of the job
-    return (0 if not problems else 1 if lacks else 2), about[0] if about else ""
+def _fit(kind: str, own: Path, *, whole: bool) -> tuple[int, str]:
+    """``whole``: whether the readings have the calibration of the artefact with them, where a kind needs it of each point."""
+    found = questions.job_begun(kind, str(own), {}, {"machine.name": "?", "job.date": "2000-01-01"})
+    wrong = [one.problem for one in found.problems if Path(one.file).name == own.name]
+    return (2, wrong[0]) if wrong and whole else (0 if found.sound else 1, "")
 
 
 def machine(job: str) -> str:
