@@ -19,7 +19,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.values import dataclass
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.due.due import DueItem
-from cmm_uq.laboratory.due.rule import Rule
+from cmm_uq.laboratory.due.kept import unsettled
 from cmm_uq.laboratory.records.facts import ChainFinding
 from cmm_uq.laboratory.records.listing import (
     CertificateFilter,
@@ -30,7 +30,6 @@ from cmm_uq.laboratory.records.listing import (
     chosen,
     parts_of,
     standing_of_all,
-    unsettled_machines,
 )
 from cmm_uq.laboratory.records.queries import Serials
 from cmm_uq.laboratory.records.store import Records
@@ -290,7 +289,7 @@ def overview(records: Records, due: DueDates, today: dt.date, before: MachineOve
     if before is not None and before.today == today and (later := changed_machines(records, *before.head)) is not None:
         other = {serial for serial, _ in artefacts.items() ^ before.artefacts.items()}
         with_other = {one.serial for one in before.machines if one.due is not None and one.due.artefact in other}
-        changed = later | with_other | unsettled_machines(records, today, lambda rule: Rule.of(rule).pooled)
+        changed = later | with_other | unsettled(records, today)
         changed = changed if len(changed) <= MOST_ANEW else None
     newest, days = standing_of_all(records, changed), due(records, today, changed)
     found = [MachineStanding.of(one, days.get(one.machine.serial), today) for one in newest]

@@ -23,6 +23,11 @@ _PLACES = 10  # records of which days are kept
 _WRONG = (CmmUqError, ValueError, TypeError, AttributeError, RuntimeError, KeyError)
 
 
+def unsettled(records: Records, on: dt.date) -> set[str]:
+    """Machines whose date may change though no entry speaks of them: with the day that is asked about, or by others."""
+    return unsettled_machines(records, on, lambda said: Rule.of(said).pooled)
+
+
 class KeptDates:
     """The file is ``CMM_UQ_DATES``, or ``~/.cache/cmm-uq/dates.json``, or ``none``; one that fails costs time alone."""
 
@@ -63,7 +68,7 @@ class KeptDates:
         kept, name = self._content["records"], records.shown
         self._own = {"program": program(), "head": list(records.head()), "days": {}}
         self._new["records"] = {**dict(list(kept.items())[-_PLACES:]), name: self._own}
-        self._unsettled = unsettled_machines(records, on, lambda said: Rule.of(said).pooled)
+        self._unsettled = unsettled(records, on)
         with suppress(*_WRONG):
             own = kept[name]
             changed = changed_machines(records, *own["head"]) if own["program"] == program() else None
@@ -84,5 +89,8 @@ class KeptDates:
         with suppress(OSError, RuntimeError):
             (file := self._file.expanduser()).parent.mkdir(parents=True, exist_ok=True)
             own = file.with_name(f"{file.name}.{os.getpid()}")
-            own.write_text(json.dumps(content), encoding="utf-8")
-            own.replace(file)
+            try:
+                own.write_text(json.dumps(content), encoding="utf-8")
+                own.replace(file)
+            finally:
+                own.unlink(missing_ok=True)  # half of it, where the disk is full

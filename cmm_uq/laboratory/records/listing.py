@@ -14,37 +14,12 @@ from sqlalchemy import ColumnElement, Connection, func, or_, select, union
 
 from cmm_uq.base.values import dataclass
 from cmm_uq.jobs.verdicts import Verdicts, gravest
-from cmm_uq.laboratory.records.facts import (
-    BY_NAME,
-    PART,
-    PERFORMANCE,
-    STANDING,
-    Entry,
-    RecordedMachine,
-    machine_key,
-    spelled,
-)
+from cmm_uq.laboratory.records import facts, queries, tables
+from cmm_uq.laboratory.records.facts import BY_NAME, PART, PERFORMANCE, STANDING, Entry, RecordedMachine
 from cmm_uq.laboratory.records.place import told
-from cmm_uq.laboratory.records.queries import (
-    RECORDED,
-    Serials,
-    adjusted_before,
-    blocks,
-    measured,
-    named,
-    newest_of_machine,
-)
+from cmm_uq.laboratory.records.queries import RECORDED, Serials, adjusted_before, blocks, newest_of_machine
 from cmm_uq.laboratory.records.store import Records
-from cmm_uq.laboratory.records.tables import (
-    adjustments,
-    artefacts,
-    certificates,
-    entries,
-    figures,
-    machines,
-    quantities,
-    signatures,
-)
+from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
 
 
 class ListedCertificate(NamedTuple):
@@ -110,7 +85,7 @@ def standing_of_all(records: Records, of: Serials = None) -> list[Newest]:
         .where(RECORDED).order_by(m.id)
     )  # fmt: skip
     with records.reading() as connection:
-        rows = [row for own in named(of) for row in connection.execute(query.where(*own))]
+        rows = [row for own in queries.named(of) for row in connection.execute(query.where(*own))]
     return [
         Newest(RecordedMachine(*row[:5], (), row[5].startswith(BY_NAME)), None if row[6] is None else _listed(row[6:]))
         for row in rows
@@ -119,15 +94,15 @@ def standing_of_all(records: Records, of: Serials = None) -> list[Newest]:
 
 def changed_machines(records: Records, number: int, of: str) -> set[str] | None:
     """Machines of which later entries say anything; ``None`` where these records have no entry of that number and hash."""
-    e, m, s, a = entries.c, machines.c, signatures.c, adjustments.c
+    e, m, s, a = entries.c, machines.c, tables.signatures.c, tables.adjustments.c
     stated = select(e.content).where(e.kind == "machine", e.number > number)
     with records.reading() as connection:
         if connection.execute(select(e.hash).where(e.number == number)).scalar() != of:
             return None
-        said = {machine_key(json.loads(content)) for content in connection.execute(stated).scalars()}
+        said = {facts.machine_key(json.loads(content)) for content in connection.execute(stated).scalars()}
         later = (
             select(_C.machine).where(_C.entry > number),
-            select(_C.machine).join(signatures, s.certificate == _C.entry).where(s.entry > number),
+            select(_C.machine).join(tables.signatures, s.certificate == _C.entry).where(s.entry > number),
             select(a.machine).where(a.entry > number),
             select(m.id).where(or_(m.entry > number, m.recognised.in_(said))),
         )
@@ -141,8 +116,8 @@ def unsettled_machines(records: Records, on: dt.date, pooled: Callable[[Mapping[
         rules = connection.execute(select(m.calibrate).distinct().where(m.calibrate.is_not(None))).scalars()
         common = [rule for rule in rules if pooled(json.loads(rule))]
         unsettled = (
-            select(_C.machine).where(*measured(_C), _C.day > after),
-            select(adjustments.c.machine).where(adjustments.c.day > after),
+            select(_C.machine).where(*queries.measured(_C), _C.day > after),
+            select(tables.adjustments.c.machine).where(tables.adjustments.c.day > after),
             select(m.id).where(or_(m.day > after, m.calibrate.in_(common))),
         )
         return set(connection.execute(select(m.called).where(m.id.in_(union(*unsettled)))).scalars())
@@ -189,7 +164,7 @@ def _conditions(connection: Connection, choice: CertificateFilter) -> list[Colum
 
 def _with_text(connection: Connection, text: str) -> ColumnElement[bool]:
     """A text in the job's id or the certificate's number, or in the machine's serial or name however they are spelled."""
-    key = spelled(text)
+    key = facts.spelled(text)
     of_machine = or_(*(column.contains(key, autoescape=True) for column in (machines.c.spelled, machines.c.named)))
     escaped = "".join(f"/{c}" if c in "%_/" else c for c in text)
     sqlite = connection.dialect.name == "sqlite"  # whose LIKE takes capitals for small letters, and its lower() is slow

@@ -188,3 +188,23 @@ def test_what_others_of_its_model_found_brings_a_machine_forward(
         kept, whole, _ = both(place, file, TODAY, monkeypatch)
         assert kept == whole
         assert "0" in [one.serial for one in kept.of("due", "overdue")]
+
+
+def test_a_full_disk_leaves_the_days_as_they_were_and_nothing_beside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, file = tmp_path / "records.db", tmp_path / "cache" / "dates.json"
+    with made(place, 5, 2, seed=5) as records:
+        kept = both(place, file, TODAY, monkeypatch)[0]
+        before = file.read_bytes()
+        records.append("adjustment", {"machine": {"serial": "100001", "manufacturer": "Maker 1"}, "day": "2018-01-19"})
+
+        def full(self: Path, text: str, **_: str) -> int:
+            self.write_bytes(text[:20].encode())
+            raise OSError(28, "No space left on device")
+
+        with monkeypatch.context() as disk:
+            disk.setattr(Path, "write_text", full)
+            assert both(place, file, TODAY, monkeypatch)[0] != kept
+        assert file.read_bytes() == before
+        assert [path.name for path in file.parent.iterdir()] == [file.name]
