@@ -299,15 +299,9 @@ _UNREAD: tuple[tuple[bytes | tuple[bytes, ...], str, str], ...] = (
 )  # fmt: skip
 # Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
-    *(
-        "tabular.Excel",
-        "tabular.OpenDocument",
-        "documents.Qif",
-        "documents.Dcc",
-        "reports.Calypso",
-        "lengths.q_das.Qdas",
-    ),
-    *("reports.Dmis", "pcdmis.PcDmis", "reports.Ipp", "lines.Rtl", "documents.Html", "documents.Json", "documents.Xml"),
+    *("tabular.Excel", "tabular.OpenDocument", "documents.Qif", "documents.Dcc", "reports.Calypso"),
+    *("lengths.q_das.Qdas", "reports.Dmis", "pcdmis.PcDmis", "reports.Ipp", "lines.Rtl"),
+    *("documents.Html", "documents.Json", "documents.Xml"),
 )
 
 

@@ -298,7 +298,7 @@ def columns_in(grid: CutSheet, blocks: Sequence[Block], rows: Sequence[int]) -> 
     if heads and not grid.keys and _DEGREES.search(heads[0]) and any(map(_SECONDS.search, heads)):
         what = "angles in ° beside readings in seconds of arc: of a rotary table or an angular run, and no lengths"
         fix = "Write them as a recording of a polygon (docs/reference/columns.md); where they are inches, say it by columns"
-        raise NotReadError(what, where=grid.sheet.at("", rows[0], 0, heads[0]).removeprefix(": ").strip(), fix=fix)
+        raise NotReadError(what, where=grid.at(rows[0]), fix=fix)
     _deny_summaries(found)
     for c, after in pairwise(found):  # below one head over several columns
         alike = (
