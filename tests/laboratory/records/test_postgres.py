@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import threading
 import warnings
 from collections.abc import Iterator
@@ -15,7 +16,15 @@ from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.backup import back_up, migrate, restore
 from cmm_uq.laboratory.records.facts import BEGINNING, ChainHead, Witness
-from cmm_uq.laboratory.records.listing import CertificateFilter, chosen, courses, entry_of, standing_of_all
+from cmm_uq.laboratory.records.listing import (
+    CertificateFilter,
+    changed_machines,
+    chosen,
+    courses,
+    entry_of,
+    standing_of_all,
+    unsettled_machines,
+)
 from cmm_uq.laboratory.records.opening import KNOWN, REVISION, engine_of
 from tests.laboratory.records.histories import certificate, history, take_back
 
@@ -238,3 +247,19 @@ def test_lists_are_the_same_on_a_server_as_in_a_file(url: str, tmp_path: Path) -
         assert standing_of_all(server) == standing_of_all(file)
         assert courses(server, server.machine("100000"), 2) == courses(file, file.machine("100000"), 2)
         assert entry_of(server, 3) == entry_of(file, 3)
+        some, seen = {"100001", "100004", "none"}, records.head()
+        assert standing_of_all(server, some) == standing_of_all(file, some)
+        assert server.machines(of=some) == file.machines(of=some)
+        assert [one.entry for one in server.latest(of=some)] == [one.entry for one in file.latest(of=some)]
+        day, machine = dt.date(2016, 8, 1), {"serial": "100003", "manufacturer": "Maker 0", "day": "2015-01-01"}
+        of = {"serial": "100002", "name": "CMM 100002", "manufacturer": "Maker 2"}
+        for records in (server, file):
+            records.append("machine", {**machine, "calibrate": {"method": "A3", "reliability": 0.9}})
+            records.append("check", certificate("100002", day, machine=of, interim=True))
+            assert [one.machine for one in records.checks({"100002"})] == ["100002"]
+            assert records.checks(some) == []
+            assert changed_machines(records, *seen) == {"100002", "100003"}
+            assert changed_machines(records, seen[0], "another") is None
+            later = unsettled_machines(records, dt.date(2018, 12, 31), lambda rule: rule["method"] == "A3")
+            assert later == {"100003"}
+            assert len(unsettled_machines(records, dt.date(2015, 1, 1), lambda rule: False)) == 5
