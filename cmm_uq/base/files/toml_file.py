@@ -126,11 +126,9 @@ def checked(
     try:
         data = toml_of(text, str(path), most_word=most_word, most_listed=most_listed)
     except tomllib.TOMLDecodeError as error:
-        raise _said_twice(str(error), text, str(path)) or CmmUqError(
-            f"is not valid TOML: {error}",
-            where=str(path),
-            fix="Text stands in quotes, dates as 2026-01-31, decimals with a point",
-        ) from None
+        fix = "Text stands in quotes, dates as 2026-01-31, decimals with a point"
+        invalid = CmmUqError(f"is not valid TOML: {error}", where=str(path), fix=fix)
+        raise _said_twice(str(error), text, str(path)) or invalid from None
     data = data if beside is None else beside(data)
     table = cast("type[Facts]", model if isinstance(model, type) else model(data))
     try:
@@ -279,24 +277,18 @@ def _said_twice(error: str, text: str, where: str) -> CmmUqError | None:
         if named := _NAMED.match(line):
             table = table if named[1] is None else named[1].replace(" ", "")
             places[number] = table if named[2] is None else f"{table}.{named[2].strip()}".removeprefix(".")
-    own = places.get(int(at[1])) if at else None
+    own = places.pop(int(at[1]), None) if at else None
     if at is None or own is None:
         return None
-    parts = own.split(".")
-    wholes = {".".join(parts[:count]) for count in range(len(parts), 0, -1)}
-    others = [
-        number
-        for number, name in places.items()
-        if number != int(at[1]) and name in wholes and not (lines[number - 1].lstrip().startswith("[") and name != own)
-    ]
+    above = [(number, name) for number, name in places.items() if f"{own}.".startswith(f"{name}.")]
+    others = [(number, name) for number, name in above if name == own or not lines[number - 1].lstrip().startswith("[")]
     if not others:
         return None
-    name, other = places[others[0]], others[0]
+    other, name = others[0]
     fix = f"Keep one of both: write all keys of [{name}] below its heading, or all of them in the line of its key"
+    fix = fix if "{" in lines[other - 1] + lines[int(at[1]) - 1] else "Keep one of them"
     return CmmUqError(
-        f"states {name} twice: in line {other} and in line {at[1]}",
-        where=f"{where} line {at[1]}",
-        fix=fix if "{" in lines[other - 1] + lines[int(at[1]) - 1] else "Keep one of them",
+        f"states {name} twice: in line {other} and in line {at[1]}", where=f"{where} line {at[1]}", fix=fix
     )
 
 
