@@ -26,7 +26,7 @@ SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.reference\.")
 """Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
 CEILING = {
-    "": 134, "base": 3_533, "maths": 11_051, "jobs": 19_443, "machine": 7_805, "analysis": 21_905, "laboratory": 14_773,
+    "": 134, "base": 3_533, "maths": 11_051, "jobs": 19_443, "machine": 7_805, "analysis": 21_905, "laboratory": 14_766,
     "certificate": 16_680, "artefacts": 13_914, "app": 18_846,
 }  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""

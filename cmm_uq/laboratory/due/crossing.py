@@ -195,7 +195,8 @@ def _drawn(states: _States, which: Ints, chosen: Ints, normal: Floats) -> Floats
         root = np.sqrt(np.maximum(left[i, i], 0.0))
         column = left[i, i:] / np.where(root > 0, root, 1.0)
         drawn[i:] += column * number
-        left[i + 1 :, i + 1 :] -= column[1:, None] * column[1:]
+        for j in range(1, len(column)):
+            left[i + j, i + j :] -= column[j] * column[j:]
     return drawn
 
 
@@ -232,7 +233,8 @@ def _probabilities(
         )
         crosses *= -(~stepped | (np.abs(after + steps) <= high)).astype(np.float64)
         crosses[0] *= inside
-        np.multiply.accumulate(crosses, axis=0, out=crosses)
+        for g in range(1, len(gap)):
+            crosses[g] *= crosses[g - 1]
         inside = crosses[-1]
         survival[:, start + 1 :] = (inside @ part)[:, None]
         survival[:, 1 + start : 1 + start + len(gap)] = (crosses @ part).T
@@ -262,13 +264,22 @@ def _moves(
     phase, cosine, sine = drift.phase(until).T[..., None], theta[2], theta[3]
     most, crest = np.hypot(cosine, sine), np.arctan2(sine, cosine) / (2 * np.pi)
 
+    def at(day: Floats) -> list[Floats]:
+        """The season, and how many crests and troughs there were."""
+        turned = day / (2 * np.pi) - crest
+        return [np.cos(day) * cosine + np.sin(day) * sine, np.floor(turned), np.floor(turned + 0.5)]
+
+    last = at(phase[:1])
+
     def moves(gaps: slice) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        own = phase[gaps.start : gaps.stop + 1]
-        season, turned = np.cos(own) * cosine + np.sin(own) * sine, own / (2 * np.pi) - crest
+        nonlocal last
+        each = zip(last, at(phase[gaps.start + 1 : gaps.stop + 1]), strict=True)
+        season, *turns = (np.concatenate(pair) for pair in each)
+        last = [season[-1:], *(turn[-1:] for turn in turns)]
         rise, fall = most - season, most + season
         move = rate[gaps] * theta[0] + growth[gaps] * growing + season[1:] - season[:-1]
         move += by_settling[gaps].take(place, axis=1) * theta[1]
-        up, down = (np.diff(np.floor(each), axis=0) > 0 for each in (turned, turned + 0.5))
+        up, down = (turn[1:] > turn[:-1] for turn in turns)
         return move, up * rise[:-1], up * rise[1:], down * fall[:-1], down * fall[1:]
 
     return moves

@@ -15,7 +15,7 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.points import Floats
 from cmm_uq.base.values import dataclass, replace
 from cmm_uq.laboratory.due import drift
 
@@ -52,11 +52,12 @@ class DriftState:
 
     def weights(self, prior: drift.DriftPrior) -> Floats:
         """Of nodes and tales given the certificates, (N, K, M), one in all for each machine."""
-        evidence = self.log_evidence + np.log(prior.weight)
+        own = self.log_evidence
+        evidence = own + np.log(prior.weight)
         of_group = np.stack([log_sum(np.where(row, evidence, -np.inf)) for row in prior.members], axis=-1)
         each = np.array([prior.weight[row].sum() for row in prior.members])
         node = np.exp(evidence - of_group[:, prior.group]) * each[prior.group]
-        return np.asarray(node[..., None] * np.exp(self.log_weight - self.log_evidence[..., None]), dtype=np.float64)
+        return np.asarray(node[..., None] * np.exp(self.log_weight - own[..., None]), dtype=np.float64)
 
 
 def log_sum(values: Floats) -> Floats:
@@ -130,6 +131,8 @@ def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: drift.Drift
 def _side_by_side(parts: list[DriftState], order: NDArray[np.intp]) -> DriftState:
     """Machines with few certificates have few tales; the others' further ones have no weight."""
     parts = [part for part in parts if len(part.log_weight)]
+    if len(parts) == 1 and (np.diff(order) > 0).all():
+        return parts[0]
     most = max(part.log_weight.shape[-1] for part in parts)
 
     def joined(arrays: list[Floats], value: float) -> Floats:
@@ -166,7 +169,7 @@ def _moved(state: DriftState, machines: drift.Histories, prior: drift.DriftPrior
 def _measured(
     state: DriftState, machines: drift.Histories, prior: drift.DriftPrior, k: int, kept: int, *, counted: bool
 ) -> DriftState:
-    """With certificate k: each tale becomes four (no step or one before it; right or wrong), the likeliest are kept."""
+    """With certificate k: each tale becomes four (no step or one before it; right or wrong), the likeliest have an update."""
     N, K, M = state.log_weight.shape
     shared, variance = machines.shared[k, :, :N, None, None], machines.u[k, :N, None, None] ** 2
     first = len(state.mean) - len(shared)  # of the artefacts
@@ -181,8 +184,28 @@ def _measured(
         spread[:, :, tale] = expected + stepped * size + wrong * _TIMES * variance
         log_weight[:, :, tale] = state.log_weight + (steps[stepped] + _ODDS[wrong])[..., None]
     log_weight -= 0.5 * (np.log(2 * np.pi * spread) + missed[:, :, None] ** 2 / spread)
-    stepping = np.arange(len(state.mean))[[0, -1]] if counted else np.arange(1)
-    return _kept(state, log_weight, seen, spread, missed, size, kept, stepping, k)
+    few, rows = min(kept, 4 * M), np.arange(N * K)[:, None]
+    flat = log_weight.reshape(N * K, 4 * M)
+    if few < 4 * M:
+        chosen = np.argpartition(-flat, few - 1, axis=-1)[:, :few]
+    else:
+        chosen = np.broadcast_to(np.arange(4 * M), flat.shape)
+    of, tales = (rows * M + chosen % M).ravel(), (rows * 4 * M + chosen).ravel()
+
+    def taken(values: Floats, which: NDArray[np.intp], own: int = 3) -> Floats:
+        """Of the last ``own`` axes: machine, node, and what tales are made of."""
+        lead, last = values.shape[: values.ndim - own], values.shape[values.ndim - own :]
+        return values.reshape(*lead, int(np.prod(last))).take(which, axis=-1).reshape(*lead, N, K, few)
+
+    mean, covariance, seen, with_step = (taken(each, of) for each in (state.mean, state.covariance, seen, state.steps))
+    with_step[k : k + 1] = step = (chosen // M >= 2).reshape(N, K, few)
+    stepping = np.arange(len(mean))[[0, -1]] if counted else np.arange(1)  # what of the state a step changes
+    seen[stepping] += step * size
+    covariance[stepping[:, None], stepping] += step * size
+    gain = seen / taken(spread, tales, 4)
+    mean += gain * taken(missed, of)
+    covariance -= gain[:, None] * seen
+    return DriftState(mean, covariance, taken(log_weight, tales, 4), with_step)
 
 
 def _log_steps(years: Floats, prior: drift.DriftPrior) -> tuple[Floats, Floats]:
@@ -190,47 +213,6 @@ def _log_steps(years: Floats, prior: drift.DriftPrior) -> tuple[Floats, Floats]:
     expected = years[:, None] * prior.steps_per_year
     with np.errstate(divide="ignore"):
         return -expected, np.log(-np.expm1(-expected))
-
-
-def _kept(
-    state: DriftState,
-    log_weight: Floats,
-    seen: Floats,
-    spread: Floats,
-    missed: Floats,
-    size: Floats,
-    kept: int,
-    stepping: Ints,
-    k: int,
-) -> DriftState:
-    """The likeliest tales, each with its Kalman update; ``log_weight`` and ``spread`` are (N, K, 4, M).
-
-    ``stepping``: what of the state a step before certificate k changes.
-    """
-    N, K, _, M = log_weight.shape
-    few, rows = min(kept, 4 * M), np.arange(N * K)[:, None]
-    flat = log_weight.reshape(N * K, 4 * M)
-    if few < 4 * M:
-        chosen = np.argpartition(-flat, few - 1, axis=-1)[:, :few]
-    else:
-        chosen = np.broadcast_to(np.arange(4 * M), flat.shape)
-    of, tale = (rows * M + chosen % M).ravel(), (rows * 4 * M + chosen).ravel()
-
-    def taken(values: Floats, which: NDArray[np.intp], own: int = 3) -> Floats:
-        """Of the last ``own`` axes: machine, node, and what tales are made of."""
-        lead, last = values.shape[: values.ndim - own], values.shape[values.ndim - own :]
-        return values.reshape(*lead, int(np.prod(last))).take(which, axis=-1).reshape(*lead, N, K, few)
-
-    mean, covariance, seen, steps = (taken(each, of) for each in (state.mean, state.covariance, seen, state.steps))
-    step = (chosen // M >= 2).reshape(N, K, few)
-    steps[k : k + 1] = step
-    stepped = step * size
-    seen[stepping] += stepped
-    covariance[stepping[:, None], stepping] += stepped
-    gain = seen / taken(spread, tale, 4)
-    mean += gain * taken(missed, of)
-    covariance -= gain[:, None] * seen
-    return DriftState(mean, covariance, taken(log_weight, tale, 4), steps)
 
 
 FEWEST = 2  # certificates from which on a history says anything of a machine's own drift
